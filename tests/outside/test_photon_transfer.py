@@ -1,7 +1,9 @@
 """photon-transfer beside published figures and beside numpy: the EMVA 1288 reference set, and cameras of our own."""
 
 import json
+import pathlib
 import subprocess
+import tempfile
 import unittest
 
 import numpy
@@ -132,6 +134,101 @@ class ReferenceSet(unittest.TestCase):
             self.assertAlmostEqual(self.channel[f"prnu_{name}"]["value"] / expected, 1, delta=1e-3)
         gain = self.channel["gain_adu_per_e"]["value"]
         self.assertAlmostEqual(self.channel["dsnu_column_e"]["value"] / (numpy.sqrt(part("column", 1)) / gain), 1, delta=1e-6)
+
+
+class Drawn:
+    """A monochrome camera of 12 bits as numpy draws it: K 0.3, black 100.25 ADU, full well 12000 e-, read noise and dark current as they are given."""
+
+    GAIN, BLACK, FULL_WELL, EFFICIENCY, PRNU, SIZE = 0.3, 100.25, 12000.0, 0.5, 0.01, (96, 128)
+    SHARES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.4, 1.8)
+
+    def __init__(self, seed, read_e=6.0, dark_e_per_s=500.0, dcnu=0.1, hot_share=0.0, hot_e_per_s=0.0, held=()):
+        self.random = numpy.random.default_rng(seed)
+        draw = lambda std: std * self.random.standard_normal(self.SIZE)
+        self.response, self.offset = 1 + draw(self.PRNU), draw(1.0)
+        self.rate = dark_e_per_s * (1 + draw(dcnu)).clip(0)
+        self.rate += (self.random.random(self.SIZE) < hot_share) * self.random.exponential(max(hot_e_per_s, 1e-9), self.SIZE)
+        self.read_e, self.held = read_e, held
+
+    def frame(self, light_e, time_s):
+        charge = numpy.minimum(self.random.poisson(light_e * self.response + self.rate * time_s), self.FULL_WELL)
+        noisy = charge + self.offset + self.read_e * self.random.standard_normal(self.SIZE)
+        codes = numpy.rint(self.GAIN * noisy + self.BLACK).clip(0, 4095).astype(numpy.uint16)
+        for (y, x), code in self.held:
+            codes[y, x] = code
+        return codes
+
+    def measured(self, flat_s, darks_s):
+        """What the program finds, and what it says; flats are as long as they are bright where they have no time of their own."""
+        with tempfile.TemporaryDirectory() as folder:
+            folder, rows = pathlib.Path(folder), ["File,Kind,EXPOSURE_S,photons"]
+
+            def put(kind, light_e, time_s, count):
+                for _ in range(count):
+                    name = f"{len(rows)}.png"
+                    Image.fromarray(self.frame(light_e, time_s)).save(folder / name)
+                    rows.append(f"{name},{kind},{time_s},{light_e / self.EFFICIENCY if kind == 'flat' else ''}")
+
+            for share in self.SHARES:
+                put("flat", share * self.FULL_WELL, flat_s or 0.02 * share, 8 if share == 0.5 else 2)
+            for index, time_s in enumerate(darks_s):
+                put("dark", 0.0, time_s, 2 if index else 8)
+            (folder / "list.csv").write_text("\n".join(rows) + "\n")
+            command = [BINARIES / "photon-transfer", folder / "list.csv", "--white", "4095", "--cfa", "monochrome", "--output-format", "json"]
+            told = subprocess.run(command, check=True, capture_output=True, timeout=300, text=True)
+        [channel] = json.loads(told.stdout)["channels"]
+        return channel, told.stderr
+
+
+class DrawnCameras(unittest.TestCase):
+    """Cameras whose numbers are known: each lies within its interval, of so many draws but for as many as chance takes."""
+
+    DARKS_S = (0.02, 0.1, 0.25, 0.5, 1.0)
+
+    def outside(self, channel, truths):
+        return sum(not channel[key]["low"] <= truth <= channel[key]["high"] for key, truth in truths.items())
+
+    def test_full_well_is_that_of_all_charge(self):
+        outside = 0
+        for seed in range(8):
+            times = [0.02 * share for share in Drawn.SHARES]
+            channel, said = Drawn(seed, dark_e_per_s=25000.0).measured(None, times)
+            self.assertNotIn("exchanged", said)
+            outside += self.outside(channel, {"full_well_e": Drawn.FULL_WELL})
+        self.assertLessEqual(outside, 3)
+
+    def test_quiet_darks_tell_no_more_than_rounding_leaves(self):
+        for read_adu in 0.1, 0.2, 0.4, 0.5:
+            outside = 0
+            for seed in range(8):
+                camera = Drawn(seed, read_e=read_adu / Drawn.GAIN, dark_e_per_s=10.0)
+                channel, said = camera.measured(0.02, self.DARKS_S)
+                for untrue in "black level moves", "response bends":
+                    self.assertNotIn(untrue, said)
+                truths = {"black_level_adu": Drawn.BLACK + Drawn.GAIN * camera.offset.mean(), "dark_current_e_per_s": camera.rate.mean()}
+                outside += self.outside(channel, truths)
+            self.assertLessEqual(outside, 3, read_adu)
+
+    def test_full_hot_photosites_do_not_lower_the_dark_current(self):
+        outside = 0
+        share, hot, dark = 0.01, 12000.0, 500.0
+        current = dark + share * hot
+        spread = ((0.1 * dark) ** 2 + share * (2 - share) * hot ** 2) ** 0.5
+        for seed in range(8):
+            camera = Drawn(seed, hot_share=share, hot_e_per_s=hot)
+            channel, _ = camera.measured(0.02, (0.005, 0.01) + self.DARKS_S)
+            outside += self.outside(channel, {"dark_current_e_per_s": current, "dcnu": spread / current})
+        self.assertLessEqual(outside, 4)
+
+    def test_photosites_that_hold_one_value_are_left_out(self):
+        held = [((40, 50), 4095), ((41, 50), 1500), ((60, 20), 0)]
+        for seed in range(3):
+            channel, _ = Drawn(seed, held=held).measured(0.02, self.DARKS_S)
+            sites = [((site["y"], site["x"]), site["light_adu"]) for site in channel["defects"]["stuck"]["sites"]]
+            self.assertEqual(sites, held)
+            self.assertLessEqual(channel["defects"]["light"]["count"], 1)
+            for key, truth in ("prnu", Drawn.PRNU), ("dcnu", 0.1), ("gain_adu_per_e", Drawn.GAIN):
+                self.assertLess(abs(channel[key]["value"] / truth - 1), 0.05, key)
 
 
 def squares(images, tables):

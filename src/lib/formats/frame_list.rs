@@ -127,6 +127,20 @@ pub fn read(path: &Path) -> Result<FrameList> {
     Ok(list)
 }
 
+/// The descriptor of an EMVA 1288 measurement that lies in a folder, if there is one.
+pub fn descriptor_in(folder: &Path) -> Option<PathBuf> {
+    /// Descriptors are no larger, in bytes.
+    const LARGEST: u64 = 1 << 22;
+    let mut texts: Vec<PathBuf> =
+        std::fs::read_dir(folder).ok()?.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    texts.retain(|path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("txt")));
+    texts.sort();
+    texts.into_iter().find(|path| {
+        let is_small = path.metadata().is_ok_and(|file| file.is_file() && file.len() <= LARGEST);
+        is_small && std::fs::read_to_string(path).is_ok_and(|text| is_descriptor(&text))
+    })
+}
+
 fn is_yaml(path: &Path, text: &str) -> bool {
     let is_named =
         path.extension().is_some_and(|end| end.eq_ignore_ascii_case("yaml") || end.eq_ignore_ascii_case("yml"));
@@ -168,14 +182,15 @@ fn check(name: &str, frame: &ListedFrame) -> Result<()> {
 
 fn of_table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
     let columns = csv::columns(name, bytes)?;
-    if let Some(unknown) = columns.iter().find(|column| !COLUMNS.contains(&column.trim())) {
-        let are_blank = unknown.split_whitespace().all(|word| COLUMNS.contains(&word));
+    let is_known = |word: &str| COLUMNS.iter().any(|known| known.eq_ignore_ascii_case(word));
+    if let Some(unknown) = columns.iter().find(|column| !is_known(column.trim())) {
+        let are_blank = unknown.split_whitespace().all(is_known);
         let advice = if are_blank { ", parted by commas, semicolons or tabs" } else { "" };
         let problem = format!("unknown column `{unknown}`; a list of frames has {}{advice}", COLUMNS.join(", "));
         return Err(Error::format(name, problem));
     }
     let column = |wanted: &str| -> Result<Option<Vec<String>>> {
-        let found = columns.iter().find(|column| column.trim() == wanted);
+        let found = columns.iter().find(|column| column.trim().eq_ignore_ascii_case(wanted));
         found.map(|column| csv::text_column(name, bytes, column)).transpose()
     };
     let files = column("file")?.ok_or_else(|| Error::format(name, "it has no column `file`"))?;
@@ -326,6 +341,7 @@ mod tests {
     fn tables_are_parted_as_others_are() {
         for text in [
             "file,kind,exposure_s\na b.tiff,flat,0.02\nc.tiff,dark,0.02\n",
+            "File,KIND,Exposure_s\na b.tiff,flat,0.02\nc.tiff,dark,0.02\n",
             "file;kind;exposure_s\na b.tiff;flat;0,02\nc.tiff;dark;0,02\n",
             "file;kind;exposure_s\r\na b.tiff;flat;0.02\r\nc.tiff;dark;0.02\r\n",
             "file\tkind\texposure_s\na b.tiff\tflat\t0,02\nc.tiff\tdark\t2e-2\n",

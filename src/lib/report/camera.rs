@@ -1,7 +1,7 @@
 //! Reports of measured cameras: as text, JSON, YAML and Markdown.
 
 use super::{form_of, in_digits, table, unwritable};
-use crate::analysis::photon_transfer::{ClassFindings, Finding, OUTSTANDING, PatternView};
+use crate::analysis::photon_transfer::{ClassFindings, Finding, NAMED, OUTSTANDING, PatternView};
 use crate::error::Result;
 use crate::formats::places::named;
 use crate::formats::plots::{PlotFormat, write_plot};
@@ -152,9 +152,13 @@ fn channel(class: &ClassFindings, [light, dark]: &[Option<PatternView>; 2]) -> V
     }
     all.insert("undetermined".into(), undetermined.into());
     all.insert("curve".into(), json!(class.curve));
+    all.insert("darks".into(), json!(class.darks));
     let deviations = class.linearity.as_ref().map(|linearity| &linearity.deviations);
     all.insert("linearity".into(), json!(deviations));
-    all.insert("defects".into(), json!({"light": light.as_ref().map(defects), "dark": dark.as_ref().map(defects)}));
+    let named = &class.stuck[..class.stuck.len().min(NAMED)];
+    let stuck = json!({"count": class.stuck.len(), "sites": named});
+    let [light, dark] = [light, dark].map(|view| view.as_ref().map(defects));
+    all.insert("defects".into(), json!({"light": light, "dark": dark, "stuck": stuck}));
     all.insert("notes".into(), json!(class.notes));
     all.into()
 }

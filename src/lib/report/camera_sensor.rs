@@ -57,8 +57,10 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
             full.value
         }
         None => {
-            let reached = |class: &ClassFindings| class.curve.iter().map(|point| point.signal_adu).fold(0.0, f64::max);
-            let reached = camera.classes.iter().map(reached).fold(0.0, f64::max) / gain.value;
+            // Of all charge, that of the dark too.
+            let reached = |class: &ClassFindings| class.curve.iter().map(|point| point.mean_adu).fold(0.0, f64::max);
+            let reached = camera.classes.iter().map(reached).fold(0.0, f64::max);
+            let reached = (reached - bias_adu.value).max(0.0) / gain.value;
             let range = (top - bias_adu.value) / gain.value;
             let why = reason(&camera.classes, "full_well_e");
             let stands_in = if range > reached { "the range of the converter" } else { "what was reached" };

@@ -1,10 +1,11 @@
 //! What darks tell beyond one temperature and one exposure time: how dark current rises with temperature, and how it differs from
 //! photosite to photosite.
 
-use super::curve::{FEW_AT_ENDS, is_clipped};
+use super::curve::{are_whole, is_clipped};
 use super::fit::{Line, Point};
 use super::level::Level;
-use super::reasons::CLIPPED;
+use super::pattern::{Part, hidden_pattern, temporal};
+use super::reasons::{CLIPPED, CUT_OFF};
 use super::scatter::{Scatter, among};
 use crate::numerics::variance_components::{Interval, MeanSquare, combination};
 use std::f64::consts::LN_2;
@@ -48,8 +49,8 @@ fn fitted_in_time(points: &[(f64, f64, f64)], confidence: f64) -> Option<(Line, 
 }
 
 /// The temperature step that doubles the dark current, K, from darks at several temperatures, each at several times:
-/// log₂ I is a line over temperature \[EMVA1288, Eq. 33]. Frames scatter so beyond noise; darks that code 0 clips do not count, where the
-/// error of rounding has such a variance.
+/// log₂ I is a line over temperature \[EMVA1288, Eq. 33]. Frames scatter so beyond noise; darks that code 0 clips, and those whose hot
+/// photosites are full, do not count, where the error of rounding has such a variance.
 ///
 /// # Errors
 ///
@@ -60,10 +61,14 @@ pub fn doubling_temperature(
     rounding: f64,
     confidence: f64,
 ) -> Result<Interval, String> {
-    let whole: Vec<&Level> = darks.iter().filter(|dark| !is_clipped(dark, rounding)).collect();
+    let is_clipped = |dark: &Level| is_clipped(dark, rounding);
+    let unclipped = || darks.iter().zip(are_whole(darks)).filter(|(dark, _)| !is_clipped(dark));
+    let whole: Vec<&Level> = unclipped().filter(|(_, is_whole)| *is_whole).map(|(dark, _)| dark).collect();
     let of_rate = |temperature: f64| -> Option<(f64, f64)> {
         let own = whole.iter().filter(|dark| dark.condition.temperature_k == Some(temperature));
-        let variance = |dark: &Level| dark.mean_variance + scatter.of_black(dark).known(confidence);
+        let variance = |dark: &Level| {
+            dark.mean_variance + scatter.of_black(dark).known(confidence) + dark.hidden(rounding).mean.powi(2)
+        };
         let points: Vec<(f64, f64, f64)> =
             own.filter_map(|dark| Some((dark.condition.exposure_s?, dark.mean, variance(dark)))).collect();
         let (line, [_, variance]) = fitted_in_time(&points, confidence)?;
@@ -80,8 +85,9 @@ pub fn doubling_temperature(
         let few = "it takes darks at two temperatures or more, each at two exposure times or more";
         let are_others_warmer =
             darks.iter().any(|dark| dark.condition.temperature_k != darks[0].condition.temperature_k);
-        let is_for_clipping = are_others_warmer && whole.len() < darks.len();
-        return Err(if is_for_clipping { CLIPPED.into() } else { few.into() });
+        let reason = if darks.iter().any(is_clipped) { CLIPPED } else { CUT_OFF };
+        let is_for_ends = are_others_warmer && whole.len() < darks.len();
+        return Err(if is_for_ends { reason } else { few }.into());
     }
     // The logarithm of a rate that is not told from none tells nothing.
     let is_told = |(_, slope, variance): &&(f64, f64, f64)| *slope > 3.0 * variance.sqrt();
@@ -101,6 +107,31 @@ pub fn doubling_temperature(
     Ok(Interval { value: 1.0 / slope.value, low: 1.0 / slope.high, high: 1.0 / slope.low })
 }
 
+/// The temporal variance of single photosites in the dark, rounding included: at no exposure time, as the line through darks of three
+/// times or more has it, or else that of the shortest, with the shot noise of its dark charge.
+pub fn pixel_noise(darks: &[&Level], rounding: f64, confidence: f64) -> Interval {
+    let time = |dark: &Level| dark.condition.exposure_s.unwrap_or(0.0);
+    let hidden = |darks: &[&Level]| darks.iter().map(|dark| dark.hidden(rounding).variance).fold(0.0, f64::max);
+    let with_hidden = |of: Interval, hidden: f64| Interval { low: of.low - hidden, high: of.high + hidden, ..of };
+    let all: Vec<Level> = darks.iter().map(|dark| (*dark).clone()).collect();
+    let whole: Vec<&Level> =
+        all.iter().zip(are_whole(&all)).filter(|(_, is_whole)| *is_whole).map(|(dark, _)| dark).collect();
+    let mut times: Vec<f64> = whole.iter().filter_map(|dark| dark.condition.exposure_s).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    let point = |dark: &&Level| {
+        let own = dark.variance_variance + dark.hidden(rounding).variance.powi(2);
+        Some((dark.condition.exposure_s?, temporal(&[*dark], Part::Pixel, confidence).value, own))
+    };
+    let points: Vec<(f64, f64, f64)> = whole.iter().filter_map(point).collect();
+    if let Some((line, [of_offset, _])) = fitted(&points, confidence).filter(|_| times.len() >= 3) {
+        return with_hidden(Interval::normal(line.offset, of_offset, confidence), hidden(&whole));
+    }
+    let shortest = darks.iter().map(|dark| time(dark)).fold(f64::INFINITY, f64::min);
+    let short: Vec<&Level> = darks.iter().copied().filter(|dark| time(dark) <= shortest).collect();
+    with_hidden(temporal(&short, Part::Pixel, confidence), hidden(&short))
+}
+
 /// What single photosites of a dark differ by.
 struct Pattern {
     exposure_s: f64,
@@ -112,7 +143,7 @@ struct Pattern {
 }
 
 impl Pattern {
-    fn of(dark: &Level) -> Option<Self> {
+    fn of(dark: &Level, rounding: f64) -> Option<Self> {
         let count = dark.count();
         let mut pattern = Self { exposure_s: dark.condition.exposure_s?, variance: 0.0, own: 0.0, fourth: 0.0 };
         for site in &dark.sites {
@@ -124,6 +155,7 @@ impl Pattern {
             pattern.own += share * share * (of_means.max(0.0) + of_noise);
             pattern.fourth += share * site.fourth;
         }
+        pattern.own += hidden_pattern(dark, rounding).variance.powi(2);
         Some(pattern)
     }
 }
@@ -140,36 +172,25 @@ fn of_photosites(variance: f64, own: f64, fourth: f64, count: f64, confidence: f
 }
 
 /// The fixed pattern of darks parted into what no time adds and what goes by it: variances of single photosites at no exposure, in
-/// samples², and per second².
-///
-/// # Errors
-///
-/// Which frames would tell it.
-pub fn parted_pattern(darks: &[Level], confidence: f64) -> Result<[Interval; 2], String> {
-    // Photosites that reach the largest code in longer darks alone are cut off there.
-    let stuck = darks.iter().map(|dark| dark.at_ends[0]).fold(f64::INFINITY, f64::min);
-    let is_whole = |dark: &&Level| dark.at_ends[0] <= stuck + FEW_AT_ENDS;
-    let are_all_whole = darks.iter().all(|dark| is_whole(&dark));
-    let mut patterns: Vec<Pattern> = darks.iter().filter(is_whole).filter_map(Pattern::of).collect();
+/// samples², and per second², of codes whose error of rounding has such a variance. None of fewer than three exposure times; darks
+/// whose hot photosites are full, as they are not in the shortest, do not count.
+pub fn parted_pattern(darks: &[Level], rounding: f64, confidence: f64) -> Option<[Interval; 2]> {
+    let whole = darks.iter().zip(are_whole(darks)).filter(|(_, is_whole)| *is_whole);
+    let mut patterns: Vec<Pattern> = whole.filter_map(|(dark, _)| Pattern::of(dark, rounding)).collect();
     patterns.sort_by(|a, b| a.exposure_s.total_cmp(&b.exposure_s));
     let mut times: Vec<f64> = patterns.iter().map(|pattern| pattern.exposure_s).collect();
     times.dedup();
-    let few = if are_all_whole {
-        "it takes darks at three exposure times or more"
-    } else {
-        "hot photosites reach the largest code in the longer darks: it takes darks at three shorter exposure times or more"
-    };
-    let (true, [first, .., last]) = (times.len() >= 3, &patterns[..]) else { return Err(few.into()) };
+    let (true, [first, .., last]) = (times.len() >= 3, &patterns[..]) else { return None };
     // The pattern is the same in all of them: that it is one of many is an error that they share.
     let points: Vec<(f64, f64, f64)> =
         patterns.iter().map(|pattern| (pattern.exposure_s.powi(2), pattern.variance, pattern.own)).collect();
-    let (line, [of_offset, of_slope]) = fitted(&points, confidence).ok_or(few)?;
+    let (line, [of_offset, of_slope]) = fitted(&points, confidence)?;
     // Fourth cumulants of what no time adds and of what goes by it add up, as variances do.
     let [short, long] = [first, last].map(|pattern| pattern.exposure_s.powi(4));
     let of_time = ((last.fourth - first.fourth) / (long - short)).max(0.0);
     let of_none = (first.fourth - of_time * short).max(0.0);
     let count = darks.first().map_or(2.0, Level::count);
-    Ok([
+    Some([
         of_photosites(line.offset, of_offset, of_none, count, confidence),
         of_photosites(line.slope, of_slope, of_time, count, confidence),
     ])

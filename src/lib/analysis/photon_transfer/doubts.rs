@@ -1,6 +1,6 @@
 //! What may make the numbers of a camera wrong, as its levels show it.
 
-use super::curve::Curve;
+use super::curve::{Curve, below_saturation};
 use super::level::Level;
 
 /// So many standard deviations are beyond chance.
@@ -14,17 +14,24 @@ const DRIFT: f64 = 1e-3;
 
 /// What a user should be warned of.
 pub fn doubts(curve: &Curve, flats: &[Level], confidence: f64) -> Vec<String> {
-    let other_time = curve.other_time().map(|[flat, dark]| {
+    let other_time = curve.other_time().map(|([least, most], flat)| {
+        let darks = if least < most { format!("the line through darks of {least} to {most} s") } else { format!("darks of {least} s") };
         format!(
-            "flats of {flat} s stand above darks of {dark} s, as there are none of their exposure: black level and dark noise are those \
-             of the darks"
+            "flats of {flat} s stand above {darks}, as there are none of their exposure: black level and dark noise beneath them are taken \
+             from these"
         )
+    });
+    let unknown_time = curve.is_time_unknown().then(|| {
+        "flats stand above darks of which one tells its exposure time and the other does not: black level and dark noise beneath them \
+         are taken from these"
+            .to_owned()
     });
     let falls = curve.interval(|values| values.dark_slope, confidence).is_some_and(|slope| slope.high < 0.0);
     let falling = falls
         .then(|| "the dark signal falls with exposure time beyond chance: is there a flat among the darks?".to_owned());
     let all = [
         other_time,
+        unknown_time,
         falling,
         lit_by_none(curve, flats),
         exchanged(curve, flats),
@@ -50,8 +57,9 @@ fn lit_by_none(curve: &Curve, flats: &[Level]) -> Option<String> {
     ))
 }
 
-/// Flats of more photons that have less signal.
+/// Flats of more photons that have less signal; of full photosites it is less where more of their charge is that of the dark.
 fn exchanged(curve: &Curve, flats: &[Level]) -> Option<String> {
+    let below = below_saturation(flats);
     let counted = |flat: usize| Some((flat, flats[flat].condition.photons?));
     let mut counted: Vec<(usize, f64)> = (0..flats.len()).filter_map(counted).collect();
     counted.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -59,7 +67,9 @@ fn exchanged(curve: &Curve, flats: &[Level]) -> Option<String> {
         let [(less, photons), (more, more_photons)] = [two[0], two[1]];
         let (signal, variance) = (curve.signal(more), curve.signal_variance(more));
         let is_apart = more_photons > photons * (1.0 + LEAST_STEP);
-        is_apart && is_more(curve, less, signal * (1.0 + LEAST_STEP), variance)
+        let [mean, more_mean] = [less, more].map(|flat| flats[flat].mean);
+        let is_full = !below.contains(&more) && more_mean > mean * (1.0 - LEAST_STEP);
+        is_apart && !is_full && is_more(curve, less, signal * (1.0 + LEAST_STEP), variance)
     };
     let two = counted.windows(2).find(is_less)?;
     let [(less, photons), (more, more_photons)] = [two[0], two[1]];

@@ -1,16 +1,18 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
-use super::curve::{Curve, Values, below_saturation};
-use super::dark::{doubling_temperature, parted_pattern};
+use super::curve::{Curve, SAME_TIME, Values, below_saturation, stuck_shares, without_stuck};
+use super::dark::{doubling_temperature, parted_pattern, pixel_noise};
 use super::doubts::doubts;
 use super::level::Level;
 use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
-use super::pattern::{Part, fixed, of_light, temporal};
+use super::pattern::{Part, fixed, of_light, temporal, with_hidden};
 use super::reasons::{Reasons, UNSATURATED, of_gain};
 use super::scatter::Scatter;
 use super::settings::Settings;
+use super::stuck::StuckSite;
 use super::suspects::{Suspect, suspects};
+use super::unknown::without_gain;
 use crate::numerics::variance_components::Interval;
 use crate::text::in_digits;
 
@@ -34,6 +36,8 @@ pub struct CurvePoint {
     pub exposure_s: Option<f64>,
     /// Photons per photosite.
     pub photons: Option<f64>,
+    /// Mean.
+    pub mean_adu: f64,
     /// Mean above no light.
     pub signal_adu: f64,
     /// Temporal variance above that of no light.
@@ -55,6 +59,29 @@ pub struct DarkPoint {
     pub mean_adu: f64,
     /// Temporal variance.
     pub variance_adu2: f64,
+}
+
+impl CurvePoint {
+    /// Of a flat of such a signal and variance above those of no light.
+    pub fn of(flat: &Level, [signal_adu, variance_adu2]: [f64; 2], is_fitted: bool) -> Self {
+        Self {
+            exposure_s: flat.condition.exposure_s,
+            photons: flat.condition.photons,
+            mean_adu: flat.mean,
+            signal_adu,
+            variance_adu2,
+            variance_error_adu2: flat.variance_variance.sqrt(),
+            clipped: flat.at_ends[0],
+            is_fitted,
+        }
+    }
+}
+
+impl DarkPoint {
+    /// Of a dark.
+    pub fn of(dark: &Level) -> Self {
+        Self { exposure_s: dark.condition.exposure_s, mean_adu: dark.mean, variance_adu2: dark.variance }
+    }
 }
 
 /// What was measured of a class.
@@ -81,6 +108,8 @@ pub struct ClassFindings {
     pub doubts: Vec<String>,
     /// Levels that may not be what they are said to be.
     pub suspects: Vec<Suspect>,
+    /// Photosites that hold one value, and were left out.
+    pub stuck: Vec<StuckSite>,
 }
 
 impl ClassFindings {
@@ -90,7 +119,8 @@ impl ClassFindings {
     }
 }
 
-type Found = Result<Interval, String>;
+/// A number, or which frames would tell it.
+pub type Found = Result<Interval, String>;
 
 /// What the levels of a class tell; flats in the order of their light, darks of the flats' temperature, and all darks.
 #[allow(clippy::too_many_lines, reason = "finding after finding, as the data sheet has them")]
@@ -102,23 +132,16 @@ pub fn of_class(
     settings: &Settings,
 ) -> ClassFindings {
     let Settings { confidence, .. } = *settings;
-    let rounding = settings.rounding();
+    let (rounding, given) = (settings.rounding(), flats);
+    // Photosites that are stuck at an end of the codes cut nothing off.
+    let stuck = stuck_shares(flats, darks);
+    let [flats, darks, all_darks] = [flats, darks, all_darks].map(|levels| without_stuck(levels, stuck));
+    let (flats, darks, all_darks) = (&flats[..], &darks[..], &all_darks[..]);
     let below: Vec<&Level> = below_saturation(flats).into_iter().map(|flat| &flats[flat]).collect();
     let scatter = Scatter::of(&below, all_darks);
-    let nothing = |why: String| ClassFindings {
-        name: name.into(),
-        findings: vec![finding("gain_adu_per_e", Err(why))],
-        curve: Vec::new(),
-        darks: Vec::new(),
-        linearity: None,
-        values: None,
-        stacks: [None; 2],
-        notes: Vec::new(),
-        doubts: Vec::new(),
-        suspects: suspects(None, flats, all_darks, &scatter),
-    };
+    let nothing = |why: String| without_gain(name, why, [given, darks, all_darks], &scatter, settings);
     let curve = Curve::of(flats, darks, &scatter, settings).filter(|curve| curve.values().is_some());
-    let Some(curve) = curve else { return nothing(of_gain(flats, rounding)) };
+    let Some(curve) = curve else { return nothing(of_gain(flats, darks, rounding)) };
     if let Some(gain) = curve.interval(|values| Some(values.gain), confidence).filter(|gain| gain.low <= 0.0) {
         return nothing(format!(
             "no gain follows: by the flats it is {} to {}, as their variance does not rise with their mean beyond chance; are \
@@ -130,7 +153,7 @@ pub fn of_class(
     let mut found = Vec::new();
     let mut add = |key: &'static str, result: Found| found.push(finding(key, result));
     let number = |of: &dyn Fn(&Values) -> Option<f64>, why: String| curve.interval(of, confidence).ok_or(why);
-    let reasons = Reasons { curve: &curve, flats, darks };
+    let reasons = Reasons { curve: &curve, flats, darks, all_darks };
     let (no_darks, no_photons) = (|| reasons.of_darks(), || reasons.of_photons());
     let gain = number(&|v| Some(v.gain), String::new());
     add("gain_adu_per_e", gain.clone());
@@ -144,18 +167,16 @@ pub fn of_class(
     let read = number(&read_variance, no_darks());
     let read = read.and_then(|read| if read.high > 0.0 { Ok(read) } else { Err(reasons.of_noise()) });
     add("dark_noise_e", read.map(Interval::root));
-    let parts = [("row_noise_e", Part::Row), ("column_noise_e", Part::Column), ("pixel_noise_e", Part::Pixel)];
     let repeated: Vec<&Level> = darks.iter().filter(|dark| dark.frames >= 2).collect();
     let over_gain = |part: Found| -> Found { Ok(over(part?.root(), gain.clone()?)) };
-    // Photosites have the shot noise of dark current too: the shortest darks have the least. Rows and columns have none.
-    let time = |level: &&Level| level.condition.exposure_s.unwrap_or(0.0);
-    let shortest = repeated.iter().map(time).fold(f64::INFINITY, f64::min);
-    let short: Vec<&Level> = repeated.iter().filter(|dark| time(dark) <= shortest).copied().collect();
-    for (key, part) in parts {
-        let (off, of) = if part == Part::Pixel { (rounding, &short) } else { (0.0, &repeated) };
-        let of_part = || temporal(of, part, confidence).map(|variance| variance - off);
-        let is_told = !repeated.is_empty() && curve.tells_dark_noise();
-        add(key, if is_told { over_gain(Ok(of_part())) } else { Err(reasons.of_noise()) });
+    let quietest = repeated.iter().min_by(|a, b| a.variance.total_cmp(&b.variance));
+    for (key, part) in [("row_noise_e", Part::Row), ("column_noise_e", Part::Column), ("pixel_noise_e", Part::Pixel)] {
+        let of_part = |quietest: &&Level| match part {
+            Part::Pixel => pixel_noise(&repeated, rounding, confidence).map(|variance| variance - rounding),
+            _ => with_hidden(temporal(&repeated, part, confidence), part, quietest, rounding),
+        };
+        let told = quietest.filter(|_| curve.tells_dark_noise()).map(of_part);
+        add(key, over_gain(told.ok_or_else(|| reasons.of_noise())));
     }
     // The signal that equals its noise: ½ + √(¼ + σ²) [EMVA1288, Eq. 25].
     let threshold = |v: &Values| Some(0.5 + (0.25 + v.dark_variance?.max(0.0) / (v.gain * v.gain)).sqrt());
@@ -165,7 +186,7 @@ pub fn of_class(
     let lacking = threshold_e.as_ref().err().or(responsivity.as_ref().err()).cloned();
     add("threshold_photons", number(&threshold_photons, lacking.unwrap_or_default()));
     let limit = Limit::of(&curve, flats, settings);
-    let [saturation_e, saturation_photons, full_well] = saturation(reasons, gain.clone(), &limit);
+    let [saturation_e, saturation_photons, full_well] = limit.capacities(reasons, gain.clone());
     add("saturation_e", saturation_e.clone());
     let off = |photons: Interval| widened(photons, (settings.photon_error * photons.value).powi(2), confidence);
     add("saturation_photons", saturation_photons.map(off));
@@ -185,9 +206,10 @@ pub fn of_class(
     let [lit, dark] = stacks;
     let places =
         [lit.map(|(flat, level)| (level.place, curve.signal(flat))), dark.map(|(_, level)| (level.place, 0.0))];
-    add_patterns(&mut add, reasons, stacks, &over_gain, confidence);
+    add_patterns(&mut add, reasons, stacks, &over_gain, settings);
     let is_hidden = darks.iter().any(|dark| curve.hides(Some(dark), confidence));
-    let parted = if is_hidden { Err(reasons.of_noise()) } else { parted_pattern(darks, confidence) };
+    let parted = || parted_pattern(darks, rounding, confidence).ok_or_else(|| reasons.of_times());
+    let parted = if is_hidden { Err(reasons.of_noise()) } else { parted() };
     let photosites: f64 = darks.iter().map(Level::count).fold(f64::INFINITY, f64::min);
     // The photosites that there are are a sample of those of the camera.
     let sampled = |current: Interval| match (&parted, &gain) {
@@ -212,14 +234,8 @@ pub fn of_class(
         Ok(over(square.root(), slope))
     });
     add("dcnu", uneven);
-    let points = (0..flats.len()).map(|flat| CurvePoint {
-        exposure_s: flats[flat].condition.exposure_s,
-        photons: flats[flat].condition.photons,
-        signal_adu: curve.signal(flat),
-        variance_adu2: curve.noise(flat),
-        variance_error_adu2: flats[flat].variance_variance.sqrt(),
-        clipped: flats[flat].at_ends[0],
-        is_fitted: curve.fitted().contains(&flat),
+    let points = given.iter().enumerate().map(|(place, flat)| {
+        CurvePoint::of(flat, [curve.signal(place), curve.noise(place)], curve.fitted().contains(&place))
     });
     for finding in found.iter_mut().filter(|finding| finding.key.starts_with("saturation_")) {
         finding.what = limit.saturation;
@@ -227,30 +243,36 @@ pub fn of_class(
     let (curve_points, values) = (points.collect(), curve.values());
     let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames), &limit);
     let mut doubts = doubts(&curve, flats, confidence);
+    if let [Some((_, lit)), Some((_, dark))] = stacks
+        && !is_same_time(lit, dark)
+        && let Some((flat_s, dark_s)) = lit.condition.exposure_s.zip(dark.condition.exposure_s)
+    {
+        doubts.push(format!(
+            "patterns under light, of flats of {flat_s} s, are told from those of darks of {dark_s} s, as there are none of their \
+             exposure: the pattern that dark current has in that time counts as one of light, or against it"
+        ));
+    }
     let by_levels = straight.as_ref().ok().and_then(|line| line.told.clone());
     for (text, is_doubt) in scatter.told.iter().cloned().chain(curve.dark_told.clone()).chain(by_levels) {
         if is_doubt { doubts.push(text) } else { notes.push(text) }
     }
-    let dark_point = |dark: &Level| DarkPoint {
-        exposure_s: dark.condition.exposure_s,
-        mean_adu: dark.mean,
-        variance_adu2: dark.variance,
-    };
     ClassFindings {
         name: name.into(),
         findings: found,
         curve: curve_points,
-        darks: darks.iter().map(dark_point).collect(),
+        darks: darks.iter().map(DarkPoint::of).collect(),
         linearity: straight.ok(),
         values,
         stacks: places,
         notes,
         doubts,
         suspects: suspects(Some(&curve), flats, all_darks, &scatter),
+        stuck: Vec::new(),
     }
 }
 
-fn finding(key: &'static str, found: Found) -> Finding {
+/// A number under its key.
+pub fn finding(key: &'static str, found: Found) -> Finding {
     let named = KEYS.iter().find(|(known, ..)| *known == key);
     let (_, what, unit) = named.copied().unwrap_or((key, key, ""));
     Finding { key, what, unit, found }
@@ -298,46 +320,19 @@ fn widened(Interval { value, low, high }: Interval, variance: f64, confidence: f
 }
 
 /// An interval over another of which it is independent.
-fn over(of: Interval, by: Interval) -> Interval {
+pub fn over(of: Interval, by: Interval) -> Interval {
     let value = of.value / by.value;
     let [low, high] = [(of.low - of.value, by.high - by.value), (of.high - of.value, by.low - by.value)]
         .map(|(own, other)| (own / by.value).hypot(value * other / by.value));
     Interval { value, low: (value - low).max(0.0), high: value + high }
 }
 
-/// Saturation in electrons and in photons, and full well.
-fn saturation(reasons: Reasons, gain: Found, limit: &Limit) -> [Found; 3] {
-    let Reasons { curve, flats, .. } = reasons;
-    let gain = match gain {
-        Ok(gain) => gain,
-        Err(why) => return [Err(why.clone()), Err(why.clone()), Err(why)],
-    };
-    let Some(peak) = curve.saturated else {
-        let why = || Err(UNSATURATED.into());
-        return [why(), why(), why()];
-    };
-    if !curve.knows_black(peak) {
-        let why = || Err(reasons.of_darks());
-        return [why(), why(), why()];
+/// Whether exposure times of two levels are one, or neither is known.
+fn is_same_time(a: &Level, b: &Level) -> bool {
+    match (a.condition.exposure_s, b.condition.exposure_s) {
+        (Some(a), Some(b)) => (a - b).abs() <= SAME_TIME * a.abs(),
+        (a, b) => a == b,
     }
-    // The largest variance lies between the neighbors of the level that has it.
-    let [below, above] = [peak.saturating_sub(1), (peak + 1).min(flats.len() - 1)];
-    let bracket =
-        |of: &dyn Fn(usize) -> f64| Interval { value: of(peak), low: of(below), high: of(above).max(of(peak)) };
-    let electrons = over(bracket(&|flat| curve.signal(flat)), gain);
-    let photons = |flat: usize| flats[flat].condition.photons;
-    let has_photons = [below, peak, above].into_iter().all(|flat| photons(flat).is_some());
-    let in_photons = has_photons.then(|| bracket(&|flat| photons(flat).unwrap_or_default()));
-    let brightest = flats.len() - 1;
-    let full_well = match limit.full_well(curve.signal(brightest) / gain.value) {
-        Ok(()) => Ok(over(Interval::normal(curve.signal(brightest), curve.signal_variance(brightest), 0.95), gain)),
-        Err(why) => Err(why),
-    };
-    [
-        Ok(electrons),
-        in_photons.ok_or_else(|| "the photons per photosite of the flats about saturation are not known".into()),
-        full_well,
-    ]
 }
 
 /// The deviations from a straight line, against photons, or against time where light was constant.
@@ -366,13 +361,12 @@ fn straightness(reasons: Reasons, scatter: &Scatter, confidence: f64) -> Result<
 }
 
 /// The flat and the dark that patterns are measured on: of the most frames, the flat below saturation at every photosite; of such, the
-/// flat nearest to half of saturation, and the dark nearest to its exposure time.
+/// flat nearest to half of saturation, and the dark of its exposure time, or, where there is none, the one nearest to that.
 fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<(usize, &'a Level)>; 2] {
     let half = curve.saturated.map_or_else(
         || curve.fitted().last().map_or(0.0, |&flat| curve.signal(flat)) / 2.0,
         |peak| curve.signal(peak) / 2.0,
     );
-    let most = |levels: &[Level]| levels.iter().map(|level| level.frames).max();
     let frames = curve.patterned().iter().map(|&flat| flats[flat].frames).max();
     let off = |flat: &usize| (curve.signal(*flat) - half).abs();
     let with_most = curve.patterned().iter().copied().filter(|&flat| Some(flats[flat].frames) == frames);
@@ -380,7 +374,10 @@ fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<
     let time = |level: &Level| level.condition.exposure_s.unwrap_or(0.0);
     let wanted = flat.map_or(0.0, |flat| time(&flats[flat]));
     let apart = |dark: &(usize, &Level)| (time(dark.1) - wanted).abs();
-    let dark = darks.iter().enumerate().filter(|(_, dark)| Some(dark.frames) == most(darks));
+    let of_time = |dark: &Level| flat.is_some_and(|flat| is_same_time(dark, &flats[flat]));
+    let is_any = darks.iter().any(of_time);
+    let most = darks.iter().filter(|dark| of_time(dark) == is_any).map(|dark| dark.frames).max();
+    let dark = darks.iter().enumerate().filter(|(_, dark)| of_time(dark) == is_any && Some(dark.frames) == most);
     [flat.map(|flat| (flat, &flats[flat])), dark.min_by(|a, b| apart(a).total_cmp(&apart(b)))]
 }
 
@@ -389,9 +386,9 @@ fn add_patterns(
     reasons: Reasons,
     [flat, dark]: [Option<(usize, &Level)>; 2],
     over_gain: &dyn Fn(Found) -> Found,
-    confidence: f64,
+    settings: &Settings,
 ) {
-    let curve = reasons.curve;
+    let (curve, confidence) = (reasons.curve, settings.confidence);
     for (key, part) in
         [("prnu", Part::Total), ("prnu_row", Part::Row), ("prnu_column", Part::Column), ("prnu_pixel", Part::Pixel)]
     {
@@ -414,7 +411,9 @@ fn add_patterns(
         let hidden = || curve.hides(dark.map(|(_, dark)| dark), confidence);
         let result = match dark {
             Some(_) if hidden() => Err(reasons.of_noise()),
-            Some((_, dark)) => over_gain(Ok(fixed(dark, part, confidence))),
+            Some((_, dark)) => {
+                over_gain(Ok(with_hidden(fixed(dark, part, confidence), part, dark, settings.rounding())))
+            }
             None => Err(reasons.of_darks()),
         };
         add(key, result);

@@ -1,5 +1,6 @@
 //! What a class of photosites does at one level of light, or in the dark.
 
+use super::rounding::Hidden;
 use super::tally::SiteSurvey;
 
 /// A level of light, or darkness, as frames of it were taken.
@@ -34,6 +35,8 @@ pub struct Level {
     pub variance_variance: f64,
     /// Shares of the samples at or above the top code, and at or below 0.
     pub at_ends: [f64; 2],
+    /// The share of the photosites whose means are those of full ones, where that is counted.
+    pub full: f64,
     /// The grids of the class.
     pub sites: Vec<SiteSurvey>,
 }
@@ -56,6 +59,7 @@ impl Level {
             variance: mean(&|site| site.variance),
             variance_variance: scatter(&|site| site.variance_variance),
             at_ends: [at_end(0), at_end(1)],
+            full: mean(&|site| site.full as f64 / site.count() as f64),
             sites,
         }
     }
@@ -63,6 +67,11 @@ impl Level {
     /// Mean of all photosites of a frame.
     pub fn frame_mean(&self, frame: usize) -> f64 {
         self.sites.iter().map(|site| site.frame_means[frame] * site.count() as f64).sum::<f64>() / self.count()
+    }
+
+    /// How far its mean and its variance may be off as rounding hides noise; samples that are not rounded hide none.
+    pub fn hidden(&self, rounding: f64) -> Hidden {
+        if rounding > 0.0 { Hidden::behind(self.variance, self.variance_variance) } else { Hidden::default() }
     }
 
     /// Independent values that its variance is an average of.

@@ -1,8 +1,11 @@
 //! What saturates: photosites that are full, or the converter, which has no larger code.
 
 use super::curve::{Curve, LEAST_VARIANCE};
+use super::findings::{Found, over};
 use super::level::Level;
+use super::reasons::{CLIPPED, Reasons, UNSATURATED};
 use super::settings::Settings;
+use crate::numerics::variance_components::Interval;
 
 /// Where flats end, and what ends there.
 #[derive(Debug, Clone)]
@@ -58,12 +61,41 @@ impl Limit {
         named("saturation capacity, of the photosites", Some(told), What::Photosites, is_reached)
     }
 
-    /// Whether the brightest flat tells the full well; `reached_e` is its signal in electrons.
-    ///
-    /// # Errors
-    ///
-    /// What would tell it.
-    pub fn full_well(&self, reached_e: f64) -> Result<(), String> {
+    /// Saturation capacity in electrons, of light alone, and in photons, and the full well, of all charge.
+    pub fn capacities(&self, reasons: Reasons, gain: Found) -> [Found; 3] {
+        let Reasons { curve, flats, .. } = reasons;
+        let all = |why: String| [Err(why.clone()), Err(why.clone()), Err(why)];
+        let gain = match gain {
+            Ok(gain) => gain,
+            Err(why) => return all(why),
+        };
+        let Some(peak) = curve.saturated else { return all(UNSATURATED.into()) };
+        if !curve.knows_black(peak) {
+            return all(reasons.of_darks());
+        }
+        // The largest variance lies between the neighbors of the level that has it.
+        let [below, above] = [peak.saturating_sub(1), (peak + 1).min(flats.len() - 1)];
+        let bracket =
+            |of: &dyn Fn(usize) -> f64| Interval { value: of(peak), low: of(below), high: of(above).max(of(peak)) };
+        let electrons = over(bracket(&|flat| curve.signal(flat)), gain);
+        let photons = |flat: usize| flats[flat].condition.photons;
+        let has_photons = [below, peak, above].into_iter().all(|flat| photons(flat).is_some());
+        let in_photons = has_photons.then(|| bracket(&|flat| photons(flat).unwrap_or_default()));
+        let why = || if curve.are_darks_clipped { CLIPPED.into() } else { reasons.of_darks() };
+        let in_electrons = |(charge, room): (Interval, f64)| {
+            let charge = over(charge, gain);
+            Interval { high: charge.high + room / gain.value, ..charge }
+        };
+        let reached = curve.charge(flats.len() - 1).map(in_electrons).ok_or_else(why);
+        [
+            Ok(electrons),
+            in_photons.ok_or_else(|| "the photons per photosite of the flats about saturation are not known".into()),
+            reached.and_then(|reached| self.full_well(reached.low).map(|()| reached)),
+        ]
+    }
+
+    /// Whether the brightest flat tells the full well; its charge is no less than `reached_e`.
+    fn full_well(&self, reached_e: f64) -> Result<(), String> {
         match self.what {
             What::Converter(top) => {
                 Err(format!("the converter ends first, at the code {top}: it is no less than {reached_e:.0} e-"))

@@ -4,6 +4,7 @@
 //! \[EMVA1288, Sec. 8.2]. What light adds is that of the flats less that of the darks, over the mean between them.
 
 use super::level::Level;
+use super::rounding::Hidden;
 use crate::numerics::variance_components::{Interval, MeanSquare, MeanSquares, combination};
 
 /// A part of a variance between photosites.
@@ -65,6 +66,30 @@ fn size(level: &Level, index: usize) -> [usize; 2] {
 /// Variance that a part of the fixed pattern has at a level.
 pub fn fixed(level: &Level, part: Part, confidence: f64) -> Interval {
     combination(&fixed_terms(level, part, 1.0), confidence)
+}
+
+/// What rounding hides of the variances that the pattern and the temporal noise of a level are parted into, whose samples spread by both.
+pub fn hidden_pattern(level: &Level, rounding: f64) -> Hidden {
+    /// The value hangs on none.
+    const ANY: f64 = 0.95;
+    if rounding <= 0.0 {
+        return Hidden::default();
+    }
+    let pattern = fixed(level, Part::Total, ANY).value.max(0.0);
+    let [own, all] = [0.0, pattern].map(|pattern| Hidden::behind(level.variance + pattern, level.variance_variance));
+    Hidden { variance: own.variance + all.variance, ..all }
+}
+
+/// An interval of a part of the variance of a level with what rounding hides of it.
+pub fn with_hidden(Interval { value, low, high }: Interval, part: Part, level: &Level, rounding: f64) -> Interval {
+    /// Steps that are hidden are not made up for by more than this.
+    const MOST: f64 = 0.9;
+    let Hidden { variance, step, .. } = hidden_pattern(level, rounding);
+    if part == Part::Row || part == Part::Column {
+        // Means of rows, or columns, are steps of samples that spread.
+        return Interval { value, low: low / (1.0 + step).powi(2), high: high / (1.0 - step.min(MOST)).powi(2) };
+    }
+    Interval { value, low: low - variance, high: high + variance }
 }
 
 /// Variance that a part of the pattern has under light beyond that in the dark.

@@ -1,11 +1,14 @@
 //! Why a number does not follow from the levels of a class, and which frames would tell it.
 
-use super::curve::{Curve, LEAST_VARIANCE};
+use super::curve::{Curve, LEAST_VARIANCE, cut_off, hot_share};
 use super::level::Level;
 
 /// Of darks whose noise code 0 cuts off.
 pub const CLIPPED: &str =
     "darks are clipped at code 0: it takes frames with the black level of the camera raised above their noise";
+/// Of darks whose hot photosites are full, and are not in others.
+pub const CUT_OFF: &str = "hot photosites are full, or reach the largest code, in the longer darks: it takes darks at three shorter \
+                           exposure times or more";
 /// Of flats no one of which is beyond saturation.
 pub const UNSATURATED: &str =
     "the variance still rises at the brightest flat: brighter ones, until it falls, would tell";
@@ -19,13 +22,15 @@ pub struct Reasons<'a> {
     pub flats: &'a [Level],
     /// Darks of the flats' temperature.
     pub darks: &'a [Level],
+    /// Darks of all temperatures.
+    pub all_darks: &'a [Level],
 }
 
 impl Reasons<'_> {
     /// Why darks do not tell what no light is.
     pub fn of_darks(self) -> String {
         if self.darks.is_empty() {
-            "it takes two darks or more".into()
+            no_darks(self.all_darks).into()
         } else if self.curve.are_darks_clipped {
             CLIPPED.into()
         } else {
@@ -41,10 +46,7 @@ impl Reasons<'_> {
         if darks.is_empty() || curve.are_darks_clipped {
             self.of_darks()
         } else if curve.is_silent {
-            format!(
-                "darks have a temporal variance below {LEAST_VARIANCE} codes², which rounding hides: it takes frames at a higher gain \
-                 of the camera"
-            )
+            silent()
         } else {
             "the temporal variance of darks is not told from that of rounding: it takes more darks, or frames at a higher gain of the \
              camera"
@@ -56,6 +58,10 @@ impl Reasons<'_> {
     pub fn of_times(self) -> String {
         match self.darks {
             [_, ..] if self.curve.are_darks_clipped => CLIPPED.into(),
+            _ if self.curve.are_darks_cut_off() => CUT_OFF.into(),
+            darks if darks.len() < self.all_darks.len() => {
+                "it takes darks at three exposure times or more, of the flats' temperature".into()
+            }
             _ => "it takes darks at three exposure times or more".into(),
         }
     }
@@ -73,15 +79,31 @@ impl Reasons<'_> {
     }
 }
 
+/// Why there are no darks of the flats' temperature.
+pub fn no_darks(all_darks: &[Level]) -> &'static str {
+    if all_darks.is_empty() {
+        "it takes two darks or more"
+    } else {
+        "the darks are of other temperatures than the flats: it takes two darks or more of the flats' temperature"
+    }
+}
+
+/// Of darks whose noise rounding hides.
+pub fn silent() -> String {
+    format!(
+        "darks have a temporal variance below {LEAST_VARIANCE} codes², which rounding hides: it takes frames at a higher gain of the \
+         camera"
+    )
+}
+
 /// Why no gain follows from flats.
-pub fn of_gain(flats: &[Level], rounding: f64) -> String {
-    let is_silent = |flat: &&Level| rounding > 0.0 && flat.variance < LEAST_VARIANCE && flat.at_ends[0] == 0.0;
-    let counts = [
-        (flats.iter().filter(|flat| flat.at_ends[0] > 0.0).count(), "reach the largest code"),
-        (flats.iter().filter(is_silent).count(), "have a variance that rounding hides"),
-    ];
-    let told: Vec<String> =
-        counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
+pub fn of_gain(flats: &[Level], darks: &[Level], rounding: f64) -> String {
+    let reasons: Vec<&str> = flats.iter().filter_map(|flat| cut_off(flat, hot_share(darks), rounding)).collect();
+    let mut kinds = reasons.clone();
+    kinds.sort_unstable();
+    kinds.dedup();
+    let count = |what: &str| reasons.iter().filter(|reason| **reason == what).count();
+    let told: Vec<String> = kinds.iter().map(|what| format!("{} {what}", count(what))).collect();
     let left_out = match &told[..] {
         [] => String::new(),
         told => format!(" (of {} levels of flats {})", flats.len(), told.join(", and ")),

@@ -12,6 +12,7 @@
 //! ways \[CameronEtAl2011].
 
 use super::sites::Site;
+use super::stuck::Stuck;
 use super::tally::{SiteSurvey, Tally};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
@@ -33,6 +34,19 @@ pub struct Survey {
     pub quad: [f64; 4],
 }
 
+/// How frames are surveyed.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Asked<'a> {
+    /// The largest code, where it is known.
+    pub top: Option<f64>,
+    /// The mean from which on a photosite counts as full, where it is known.
+    pub full: Option<f64>,
+    /// Photosites that are left out.
+    pub stuck: Option<&'a Stuck>,
+    /// Whether the mean of the frames is kept.
+    pub keeps: bool,
+}
+
 /// Reads all rows of frames of one condition, which are alike; at two or more. `top` is the largest code, where it is known; the
 /// mean of the frames is kept where `keeps` says so. Memory is a few rows of each, and that mean.
 ///
@@ -40,6 +54,16 @@ pub struct Survey {
 ///
 /// Those of the frames; [`Error::Data`] for samples that are not finite, and for grids of fewer than 2x2.
 pub fn survey<S: RowSource>(frames: &mut [S], top: Option<f64>, keeps: bool) -> Result<Survey> {
+    survey_as(frames, &Asked { top, keeps, ..Asked::default() })
+}
+
+/// The same, as it is asked.
+///
+/// # Errors
+///
+/// As [`survey`].
+pub fn survey_as<S: RowSource>(frames: &mut [S], asked: &Asked) -> Result<Survey> {
+    let Asked { top, full, stuck, keeps } = *asked;
     let header = frames[0].header().clone();
     let geometry = header.geometry.clone();
     let sites = Site::of(&header);
@@ -47,7 +71,9 @@ pub fn survey<S: RowSource>(frames: &mut [S], top: Option<f64>, keeps: bool) -> 
         let [columns, rows] = [geometry.width, geometry.height];
         return Err(header.refuse(format!("{columns}x{rows} photosites are too few for statistics of each class")));
     }
-    let mut tallies: Vec<Tally> = sites.iter().map(|site| Tally::new(site, frames.len(), top)).collect();
+    let stand_ins = |place: usize| stuck.map_or_else(Vec::new, |stuck| stuck.stand_ins(place));
+    let tally = |(place, site): (usize, &Site)| Tally::new(site, frames.len(), [top, full], stand_ins(place));
+    let mut tallies: Vec<Tally> = sites.iter().enumerate().map(tally).collect();
     let planes = geometry.channels.len();
     let mut picture = keeps.then(|| vec![0.0; geometry.row_samples() * geometry.height]);
     let step = frames.iter().map(|frame| geometry.band_rows(frame.natural_rows(), 1)).max().unwrap_or(1).max(1);

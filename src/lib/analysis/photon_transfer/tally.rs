@@ -1,6 +1,7 @@
 //! Sums over a grid of photosites, row by row, and what they tell.
 
 use super::sites::Site;
+use super::stuck::StandIn;
 use crate::numerics::variance_components::{MeanSquare, MeanSquares, SquareSums};
 use crate::numerics::vectors::{self, Instructions, Kernel};
 use std::ops::Range;
@@ -22,6 +23,8 @@ pub struct SiteSurvey {
     pub variance_variance: f64,
     /// Samples at or above the top code, and at or below 0.
     pub at_ends: [u64; 2],
+    /// Photosites whose means are at or above that of full ones, where that is known.
+    pub full: u64,
     /// The largest sample, and how many are it, where no top code is known.
     pub largest: Option<(f64, u64)>,
     /// Mean squares of the temporal noise.
@@ -32,7 +35,7 @@ pub struct SiteSurvey {
     pub fourth: f64,
     /// Means of the frames.
     pub frame_means: Vec<f64>,
-    /// Two frames whose samples are the same, bit by bit, though they vary from photosite to photosite.
+    /// Two frames whose samples are the same, or differ by one number alone, though they vary from photosite to photosite.
     pub copies: Option<[usize; 2]>,
 }
 
@@ -49,6 +52,11 @@ pub struct Tally {
     frames: usize,
     top: f64,
     at_ends: [u64; 2],
+    /// The mean of full photosites, and how many have it.
+    full: (f64, u64),
+    /// What stands in for photosites that are stuck, in the order of rows; and the first of them that is not reached yet.
+    stand_ins: Vec<StandIn>,
+    reached: usize,
     /// Samples of the first frame that are not those of the photosite before them in the row.
     uneven: u64,
     largest: (f64, u64),
@@ -83,14 +91,18 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Of such a grid in so many frames, whose largest code is `top` where it is known.
-    pub fn new(site: &Site, frames: usize, top: Option<f64>) -> Self {
+    /// Of such a grid in so many frames, whose largest code is `top` and whose full photosites have such a mean, where these are known;
+    /// photosites that are stuck have others stand in.
+    pub fn new(site: &Site, frames: usize, [top, full]: [Option<f64>; 2], stand_ins: Vec<StandIn>) -> Self {
         let columns = site.size[0];
         Self {
             size: site.size,
             frames,
             top: top.unwrap_or(f64::INFINITY),
             at_ends: [0; 2],
+            full: (full.unwrap_or(f64::INFINITY), 0),
+            stand_ins,
+            reached: 0,
             uneven: 0,
             largest: (f64::NEG_INFINITY, 0),
             center: 0.0,
@@ -137,8 +149,13 @@ impl Tally {
     fn gather(&mut self, site: &Site, bands: &[Vec<f32>], place: Range<usize>) {
         let columns = self.size[0];
         self.means.fill(0.0);
+        let row = self.row_means.len();
+        let of_row = self.stand_ins[self.reached..].iter().take_while(|stuck| stuck.row == row).count();
+        let stand_ins = &self.stand_ins[self.reached..self.reached + of_row];
+        self.reached += of_row;
         for (samples, band) in self.samples.chunks_exact_mut(columns).zip(bands) {
             site.gather(&band[place.clone()], samples);
+            stand_ins.iter().for_each(|stuck| samples[stuck.column] = samples[stuck.by]);
             let (mut at_top, mut at_bottom) = (0, 0);
             for (mean, sample) in self.means.iter_mut().zip(samples) {
                 *mean += *sample;
@@ -164,6 +181,10 @@ impl Tally {
         let count = columns as f64;
         let share = 1.0 / self.frames as f64;
         self.means.iter_mut().for_each(|mean| *mean *= share);
+        let (full, _) = self.full;
+        if full < f64::INFINITY {
+            self.full.1 += self.means.iter().map(|mean| u64::from(*mean >= full)).sum::<u64>();
+        }
         if self.row_means.is_empty() {
             self.center = sum(&self.means) / count;
         }
@@ -213,21 +234,37 @@ impl Tally {
         ((fourth - 3.0 * second * second) / 2.0).max(0.0)
     }
 
-    /// Two frames whose samples are the same: then all rows and columns of both depart alike, and of two frames nothing departs at
-    /// all. Frames that are one value but for few photosites, as full ones and those of no noise, may well be the same.
+    /// Two frames whose samples are the same but for one number that all of one are more: then all rows and columns of both depart
+    /// alike, but for that. Frames that are one value but for few photosites, as full ones and those of no noise, may well be the same.
     fn copies(&self) -> Option<[usize; 2]> {
         /// Of frames of noise more of the samples differ from the next.
         const VARIED: f64 = 0.05;
         if self.uneven as f64 <= VARIED * (self.size[0] * self.size[1]) as f64 {
             return None;
         }
+        /// What rounding leaves of one difference of sums, to the first of them and a code.
+        const ROUNDED: f64 = 1e-9;
+        let [columns, rows] = self.size.map(|extent| extent as f64);
+        let are_one = |mut differences: Box<dyn Iterator<Item = f64> + '_>, count: f64| {
+            let Some(first) = differences.next() else { return true };
+            let allowed = ROUNDED * (first.abs() + count);
+            differences.all(|difference| (difference - first).abs() <= allowed)
+        };
         if self.frames == 2 {
-            return self.row_squares.iter().all(|square| *square == 0.0).then_some([0, 1]);
+            // The first of both departs by half of the number everywhere, and its squares are those of that.
+            let sums = || self.row_sums.iter().step_by(2);
+            let is_even = |(sum, square): (&f64, &f64)| {
+                let of_mean = self.times() * sum * sum / columns;
+                (square - of_mean).abs() <= ROUNDED * (of_mean + columns)
+            };
+            let are_even = sums().zip(&self.row_squares).all(is_even);
+            return (are_even && are_one(Box::new(sums().copied()), columns)).then_some([0, 1]);
         }
         let column = |frame: usize| &self.column_sums[frame * self.size[0]..][..self.size[0]];
         let are_same = |[one, other]: &[usize; 2]| {
-            let of_rows = self.row_sums.chunks_exact(self.frames).all(|sums| sums[*one] == sums[*other]);
-            of_rows && column(*one) == column(*other)
+            let of_rows = self.row_sums.chunks_exact(self.frames).map(|sums| sums[*one] - sums[*other]);
+            let of_columns = column(*one).iter().zip(column(*other)).map(|(one, other)| one - other);
+            are_one(Box::new(of_rows), columns) && are_one(Box::new(of_columns), rows)
         };
         (1..self.frames).flat_map(|other| (0..other).map(move |one| [one, other])).find(are_same)
     }
@@ -305,6 +342,7 @@ impl Tally {
             variance,
             variance_variance: self.variance_variance(&drifts, n),
             at_ends: self.at_ends,
+            full: self.full.1,
             largest: (self.top == f64::INFINITY).then_some(self.largest),
             temporal,
             spatial: MeanSquares { rows: of_rows, columns: of_columns, rest },

@@ -15,7 +15,7 @@ const BINS: usize = 256;
 /// A photosite stands out beyond so many standard deviations of most.
 pub const OUTSTANDING: f64 = 5.0;
 /// So many of those that stand out most are named.
-const NAMED: usize = 100;
+pub const NAMED: usize = 100;
 /// The median of absolute deviations of a normal law, in standard deviations.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
@@ -138,6 +138,16 @@ impl Grid {
         Self { columns, rows, values }
     }
 
+    /// A value less the mean of the box around it, without others that are told of.
+    fn above_others(&self, [x, y]: [usize; 2], told: &[bool]) -> f64 {
+        let margin = BOX / 2;
+        let rows = y - margin..=y + margin;
+        let around = rows.flat_map(|y| (x - margin..=x + margin).map(move |x| y * self.columns + x));
+        let others = around.filter(|at| !told[*at]);
+        let (sum, count) = others.fold((0.0, 0.0), |(sum, count), at| (sum + self.values[at], count + 1.0));
+        self.values[y * self.columns + x] - sum / count
+    }
+
     /// Means of the columns, or of the rows.
     fn profile(&self, axis: usize) -> Vec<f64> {
         let rows = self.values.chunks_exact(self.columns);
@@ -178,7 +188,7 @@ pub fn pattern_view(
     let middle = median(&mut values);
     let mut absolute: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
     let spread = median(&mut absolute) / NORMAL_MEDIAN;
-    let (outstanding, outliers) = outliers(sites, &filtered, middle, spread);
+    let (outstanding, outliers) = outliers(sites, [&grids, &filtered], middle, spread);
     let lines = [0, 1].map(|axis| {
         of_lines(
             &profiles[axis],
@@ -194,15 +204,23 @@ pub fn pattern_view(
     Some(PatternView { profiles, figure, spread, outstanding, outliers, lines })
 }
 
-/// How many photosites stand out, and how many of a normal law would; and those that do most.
-fn outliers(sites: &[&Site], filtered: &[Grid], middle: f64, spread: f64) -> ([f64; 2], Vec<Outlier>) {
+/// How many photosites stand out, and how many of a normal law would; and those that do most. One that stands out is left out of the
+/// means around its neighbors, which would stand out to the other side by a 25th of it.
+fn outliers(sites: &[&Site], [grids, filtered]: [&[Grid]; 2], middle: f64, spread: f64) -> ([f64; 2], Vec<Outlier>) {
     let mut outliers = Vec::new();
-    for (site, grid) in sites.iter().zip(filtered) {
-        for (index, value) in grid.values.iter().enumerate() {
-            if (value - middle).abs() > OUTSTANDING * spread && spread > 0.0 {
-                let place = |axis: usize, of: usize| site.first[axis] + (of + BOX / 2) * site.step[axis];
-                let [x, y] = [place(0, index % grid.columns), place(1, index / grid.columns)];
-                outliers.push(Outlier { x, y, deviation: *value });
+    let is_far = |value: f64| (value - middle).abs() > OUTSTANDING * spread && spread > 0.0;
+    for ((site, grid), filtered) in sites.iter().zip(grids).zip(filtered) {
+        let mut far: Vec<(usize, f64)> =
+            filtered.values.iter().copied().enumerate().filter(|(_, value)| is_far(*value)).collect();
+        far.sort_by(|a, b| (b.1 - middle).abs().total_cmp(&(a.1 - middle).abs()));
+        let mut told = vec![false; if far.is_empty() { 0 } else { grid.values.len() }];
+        for (index, _) in far {
+            let [x, y] = [index % filtered.columns + BOX / 2, index / filtered.columns + BOX / 2];
+            let deviation = grid.above_others([x, y], &told);
+            if is_far(deviation) {
+                told[y * grid.columns + x] = true;
+                let place = |axis: usize, of: usize| site.first[axis] + of * site.step[axis];
+                outliers.push(Outlier { x: place(0, x), y: place(1, y), deviation });
             }
         }
     }
@@ -279,4 +297,30 @@ fn histogram(values: &[f64], mean: f64, spread: f64) -> (Vec<[f64; 2]>, Vec<[f64
     };
     let measured = counts.iter().enumerate().map(|(bin, count)| [center(bin), *count]).collect();
     (measured, (0..BINS).map(law).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::philox::philox4x32_10;
+
+    /// Of a pattern of even noise two photosites beside each other that stand out by 200 and 40 spreads do, and none of those around them,
+    /// which are 8 spreads below the mean of 5x5 that has the first in it.
+    #[test]
+    fn neighbors_of_what_stands_out_do_not() {
+        const SIDE: usize = 40;
+        let site = Site { class: "Y".into(), plane: 0, first: [0, 0], step: [1, 1], size: [SIDE, SIDE] };
+        let noise = |index: usize| {
+            f64::from(philox4x32_10([u32::try_from(index).unwrap(), 0, 0, 0], [1, 2])[0]) / 4_294_967_296.0 - 0.5
+        };
+        let at = |index: usize| match index {
+            820 => 100.0,
+            822 => -20.0,
+            _ => noise(index),
+        };
+        let view = pattern_view(&[&site], [SIDE, 1], &at, false).unwrap();
+        let places: Vec<[usize; 2]> = view.outliers.iter().map(|outlier| [outlier.x, outlier.y]).collect();
+        assert_eq!((places, view.outstanding[0]), (vec![[20, 20], [22, 20]], 2.0));
+        assert!((view.outliers[1].deviation + 20.0 * 23.0 / 24.0).abs() < 1.0, "{:?}", view.outliers[1]);
+    }
 }

@@ -2,29 +2,26 @@
 
 mod checks;
 mod conditions;
+mod surveys;
 
 use super::described::{Described, DescribedWithBlack};
 use super::notes::Note;
 use super::options::Selection;
 use super::values;
 use crate::analysis::photon_transfer::{
-    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, Suspect, left_in_mean, of_class,
-    pattern_view, survey,
+    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, Suspect, left_in_mean, pattern_view,
 };
 use crate::error::{Error, Result};
 use crate::formats::frame_list::{self, FrameList};
-use crate::formats::many::OneOfMany;
 use crate::metadata::FrameHeader;
 use crate::text::counted;
 use crate::units::QuantityKind;
-use checks::{
-    check_alike, check_apart, check_array, check_same_light, doubt_of_codes, doubt_of_end, doubt_of_frames,
-    end_of_codes,
-};
+use checks::{check_alike, check_apart, check_array, doubt_of_codes, doubt_of_end, doubt_of_frames};
 use clap::Args;
 use conditions::{Group, Reading, grouped, in_folder};
 use rayon::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use surveys::Surveys;
 
 /// Flats and darks, and what is asked of them.
 #[derive(Debug, Clone, Args)]
@@ -98,34 +95,28 @@ impl PhotonTransfer {
         for head in &heads {
             check_alike(first, &head.header)?;
         }
-        let (groups, mut notes) = grouped(&list_name, &frames, &heads)?;
+        let descriptor = is_folder.then(|| frame_list::descriptor_in(&self.list)).flatten();
+        let grouped = grouped(&list_name, &frames, &heads);
+        let (groups, mut notes) = grouped.map_err(|error| without_descriptor(error, descriptor.as_deref()))?;
+        notes.extend(descriptor.map(|file| Note::Warning(beside_frames(&file))));
         notes.extend(check_apart(&heads)?.map(Note::Warning));
         if groups.iter().all(|group| !group.condition.is_lit) {
             return Err(Error::Data(format!("{list_name}: it has no two flats of one light and exposure")));
         }
-        let top = first.metadata.white_level_adu.map(|white| white.largest());
         let are_codes = first.metadata.quantity != QuantityKind::Electrons;
-        let stacks = stacks(&groups);
-        let surveys = groups.par_iter().enumerate().with_max_len(1);
-        let surveys = surveys.map(|(place, group)| survey_of(group, &read, top, stacks.contains(&place)));
-        let mut surveys = surveys.collect::<Result<Vec<_>>>()?;
-        let mut largest = top;
-        if top.is_none() && are_codes {
-            largest = end_of_codes(&groups, &mut surveys);
+        let mut taken = Surveys::of(first, &groups, &read, are_codes)?;
+        let largest = taken.largest;
+        if first.metadata.white_level_adu.is_none() && are_codes {
             notes.push(doubt_of_end(&list_name, largest));
         }
-        check_array(first, &groups, &surveys)?;
-        notes.extend(doubt_of_frames(&groups, &surveys));
-        notes.extend(doubt_of_codes(&list_name, first, &groups, &surveys));
+        check_array(first, &groups, &taken.found)?;
+        notes.extend(doubt_of_frames(&groups, &taken.found));
+        notes.extend(doubt_of_codes(&list_name, first, &groups, &taken.found));
         let settings =
             Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes, top: largest };
         let temperature_k = main_temperature(&groups);
-        let classes = classes(first, &groups, &surveys, temperature_k, &settings);
-        for place in classes.iter().flat_map(|class| class.stacks).flatten().map(|(place, _)| place) {
-            if surveys[place].picture.is_none() {
-                surveys[place] = survey_of(&groups[place], &read, top, true)?;
-            }
-        }
+        let classes = taken.measured(temperature_k, &settings)?;
+        let surveys = taken.found;
         let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys, draws)).collect();
         notes.extend(doubts_of_levels(&classes, &groups));
         notes.extend(classes.iter().flat_map(notes_of));
@@ -168,6 +159,23 @@ impl PhotonTransfer {
     }
 }
 
+/// What is said of the descriptor of a measurement that lies in a directory of frames.
+fn beside_frames(descriptor: &Path) -> String {
+    format!(
+        "{}: it describes an EMVA 1288 measurement, and is not read; given in place of the directory it tells light and exposure of its \
+         frames",
+        descriptor.display()
+    )
+}
+
+/// The same beside what is wrong with frames of which a directory does not tell enough.
+fn without_descriptor(error: Error, descriptor: Option<&Path>) -> Error {
+    match descriptor {
+        Some(file) => Error::Usage(format!("{error}; {}", beside_frames(file))),
+        None => error,
+    }
+}
+
 /// Warnings of frames that may not be what they are said to be, each level once.
 fn doubts_of_levels(classes: &[ClassFindings], groups: &[Group]) -> Vec<Note> {
     let mut told: Vec<usize> = Vec::new();
@@ -193,44 +201,6 @@ fn notes_of(class: &ClassFindings) -> Vec<Note> {
     let of_class = |text: &String| format!("{}: {text}", class.name);
     let warnings = beyond.iter().chain(&class.doubts).map(|doubt| Note::Warning(of_class(doubt)));
     warnings.chain(class.notes.iter().map(|note| Note::Remark(of_class(note)))).collect()
-}
-
-/// Reads the frames of a condition.
-fn survey_of(group: &Group, read: &Reading, top: Option<f64>, keeps: bool) -> Result<Survey> {
-    /// Files that other groups may have open meanwhile.
-    const OTHERS: usize = 64;
-    let mut frames = OneOfMany::open_all(group.files.iter().map(|file| read.options(file)).collect(), OTHERS)?;
-    for frame in &mut frames {
-        read.describe(frame.header_mut())?;
-    }
-    let found = survey(&mut frames, top, keeps)?;
-    for site in &found.sites {
-        if let Some((frame, mean)) =
-            site.frame_means.iter().enumerate().find(|(_, mean)| top.is_some_and(|top| **mean > top))
-        {
-            let (file, top) = (group.files[frame].display(), top.unwrap_or_default());
-            let problem = format!("{file}: its mean is {mean:.1}, above the largest code, {top}; name the right one");
-            return Err(Error::Usage(problem).change(&["white"]));
-        }
-        check_same_light(group, &site.frame_means, top)?;
-    }
-    if let Some([one, other]) = found.sites.iter().find_map(|site| site.copies) {
-        let problem =
-            format!("{} and {}: their samples are the same", group.files[one].display(), group.files[other].display());
-        return Err(Error::Data(problem + "; copies of one exposure do not count as two"));
-    }
-    Ok(found)
-}
-
-/// The conditions of the most frames, one with light and one without, where they are alone in that.
-fn stacks(groups: &[Group]) -> Vec<usize> {
-    let of_kind = |is_lit: bool| {
-        let own = || groups.iter().enumerate().filter(move |(_, group)| group.condition.is_lit == is_lit);
-        let most = own().map(|(_, group)| group.files.len()).max()?;
-        let mut with_most = own().filter(move |(_, group)| group.files.len() == most).map(|(place, _)| place);
-        with_most.next().filter(|_| with_most.next().is_none())
-    };
-    [true, false].into_iter().filter_map(of_kind).collect()
 }
 
 /// What the patterns of a class look like: that of light, a share of the signal, and that of the dark, in samples.
@@ -274,55 +244,6 @@ fn main_temperature(groups: &[Group]) -> Option<f64> {
     let lit = || groups.iter().filter(|group| group.condition.is_lit);
     let count = |wanted: f64| lit().filter(|group| group.condition.temperature_k == Some(wanted)).count();
     lit().filter_map(|group| group.condition.temperature_k).max_by_key(|temperature| count(*temperature))
-}
-
-/// What is measured of each class.
-fn classes(
-    head: &FrameHeader,
-    groups: &[Group],
-    surveys: &[Survey],
-    temperature_k: Option<f64>,
-    settings: &Settings,
-) -> Vec<ClassFindings> {
-    let sites = Site::of(head);
-    let mut names: Vec<&str> = Vec::new();
-    for site in &sites {
-        if !names.contains(&site.class.as_str()) {
-            names.push(&site.class);
-        }
-    }
-    let level = |name: &str, index: usize| {
-        let own = sites.iter().zip(&surveys[index].sites).filter(|(site, _)| site.class == name);
-        Level::of(index, groups[index].condition, own.map(|(_, survey)| survey.clone()).collect())
-    };
-    let light = |level: &Level| {
-        let Condition { photons, exposure_s, .. } = level.condition;
-        [photons.or(exposure_s).unwrap_or(0.0), level.mean]
-    };
-    let by_photons =
-        groups.iter().filter(|group| group.condition.is_lit).all(|group| group.condition.photons.is_some());
-    let of = |name: &&str| {
-        let of_kind = |is_lit: bool| -> Vec<Level> {
-            let wanted = |index: &usize| {
-                let condition = &groups[*index].condition;
-                condition.is_lit == is_lit
-                    && (condition.temperature_k == temperature_k || condition.temperature_k.is_none())
-            };
-            (0..groups.len()).filter(wanted).map(|index| level(name, index)).collect()
-        };
-        let [mut flats, darks] = [of_kind(true), of_kind(false)];
-        flats.sort_by(|a, b| {
-            let ([light_a, mean_a], [light_b, mean_b]) = (light(a), light(b));
-            let by_light = if by_photons { light_a.total_cmp(&light_b) } else { std::cmp::Ordering::Equal };
-            by_light.then(mean_a.total_cmp(&mean_b))
-        });
-        let all: Vec<Level> = (0..groups.len())
-            .filter(|&index| !groups[index].condition.is_lit)
-            .map(|index| level(name, index))
-            .collect();
-        of_class(name, &flats, &darks, &all, settings)
-    };
-    names.par_iter().map(of).collect()
 }
 
 /// What a report calls the number of frames.

@@ -9,7 +9,24 @@ impl Curve {
     ///
     /// Where a signal is R x (1 + ε x), of shot noise alone its variance is (1 + 2 ε x)² of that of a straight response over
     /// (1 + ε x): to first order 3 ε x more at signal K n, which the line through the levels takes for gain.
+    ///
+    /// What rounding hides of the black level is common to all levels: of what it lets the share be the least counts.
     pub fn bend(&self) -> Option<[f64; 2]> {
+        let bends = [-1.0, 0.0, 1.0].map(|sign| self.bend_above(sign));
+        let [Some([low, _]), Some([_, scatter]), Some([high, _])] = bends else { return None };
+        let least = if low * high <= 0.0 {
+            0.0
+        } else if low.abs() < high.abs() {
+            low
+        } else {
+            high
+        };
+        Some([least, scatter])
+    }
+
+    /// The same where black is as much more as rounding may hide, times a sign.
+    fn bend_above(&self, sign: f64) -> Option<[f64; 2]> {
+        let above_black = |flat: usize| self.signal(flat) - sign * self.hidden_beneath(flat);
         let light = |flat: usize| self.flats[flat].photons.map(|photons| photons.value).or(self.flats[flat].exposure_s);
         let known: Vec<usize> =
             self.fitted.iter().copied().filter(|&flat| self.beneath[flat] != Beneath::Unknown).collect();
@@ -17,7 +34,7 @@ impl Curve {
         // Signal over light is R + R ε x, whatever the light is counted in.
         let points = |share: f64| -> Option<Vec<Point>> {
             let point = |&flat: &usize| {
-                let (x, signal) = (light(flat)? / brightest, self.signal(flat));
+                let (x, signal) = (light(flat)? / brightest, above_black(flat));
                 let variance = self.signal_variance(flat) + share * signal * signal;
                 (x > 0.0).then(|| Point { x, y: signal / x, weight: x * x / variance.max(f64::MIN_POSITIVE) })
             };
@@ -38,7 +55,7 @@ impl Curve {
         let spread: f64 = points.iter().map(|point| point.weight * (point.x - middle).powi(2)).sum();
         let missed = |bend: f64| {
             let at = |(place, &flat): (usize, &usize)| {
-                let (x, signal) = (light(flat).unwrap_or(0.0) / brightest, self.signal(flat));
+                let (x, signal) = (light(flat).unwrap_or(0.0) / brightest, above_black(flat));
                 Point { x: signal, y: 3.0 * bend * x * signal, weight: self.weights.gain[place] }
             };
             let points: Vec<Point> = self.fitted.iter().enumerate().map(at).collect();

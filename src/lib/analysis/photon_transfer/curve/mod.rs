@@ -10,7 +10,11 @@
 //! that of equal weights, which the standard fits.
 
 mod bend;
+mod ends;
+mod point;
 mod weights;
+
+pub use ends::{are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, stuck_shares, without_stuck};
 
 use super::fit::{Line, Point};
 use super::level::Level;
@@ -18,57 +22,18 @@ use super::pattern::{Part, fixed};
 use super::scatter::{Component, Scatter};
 use super::settings::Settings;
 use crate::numerics::variance_components::Interval;
+use ends::peak;
+use point::{Datum, Point4};
 
-/// Below this temporal variance in codes² rounding is not the even error of [`Settings::rounding`] \[EMVA1288, Sec. 6.4].
-pub const LEAST_VARIANCE: f64 = 0.24;
+/// Below this temporal variance in codes² nothing is known of noise: without any, codes have as much half way between two of them.
+/// The standard's limit is 0.24 \[EMVA1288, Sec. 6.4].
+pub const LEAST_VARIANCE: f64 = 0.25;
 /// The fits end at this share of saturation [EMVA1288, Sec. 6.5].
 const HIGHEST: f64 = 0.7;
 /// Patterns under light are measured to this share of saturation: few photosites see a tenth more than the mean.
 const HIGHEST_PATTERN: f64 = 0.9;
-/// So many samples at an end, beyond those that darks have there, and what is measured of the others is no longer that of all.
-pub const FEW_AT_ENDS: f64 = 1e-5;
 /// Exposure times that differ by less are one.
-const SAME_TIME: f64 = 1e-6;
-
-/// A measured number and what it scatters by, a variance.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Datum {
-    value: f64,
-    variance: f64,
-}
-
-/// What a level tells: its independent numbers.
-#[derive(Debug, Clone, PartialEq)]
-struct Point4 {
-    exposure_s: Option<f64>,
-    mean: Datum,
-    variance: Datum,
-    photons: Option<Datum>,
-    /// What its light is uncertain by, as frames scatter: a relative variance.
-    light_variance: f64,
-    freedom: f64,
-    frames: f64,
-    /// What noise makes the mean scatter by.
-    noise: f64,
-}
-
-impl Point4 {
-    fn of(level: &Level, scatter: &Scatter, confidence: f64) -> Self {
-        let light_variance = scatter.of_light(level).known(confidence);
-        let of_photons = |value: f64| light_variance * value * value;
-        let of_black = scatter.of_black(level).known(confidence);
-        Self {
-            exposure_s: level.condition.exposure_s,
-            mean: Datum { value: level.mean, variance: level.mean_variance + of_black },
-            variance: Datum { value: level.variance, variance: level.variance_variance },
-            photons: level.condition.photons.map(|value| Datum { value, variance: of_photons(value) }),
-            light_variance,
-            freedom: level.freedom(),
-            frames: level.frames as f64,
-            noise: level.mean_variance,
-        }
-    }
-}
+pub const SAME_TIME: f64 = 1e-6;
 
 /// Where the dark signal beneath a flat is known from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,8 +91,10 @@ pub struct Values {
     pub gain: f64,
     /// Temporal variance of no light, rounding included.
     pub dark_variance: Option<f64>,
-    /// Mean of no light and no time.
+    /// Mean of no light and no time, or of the shortest darks.
     pub dark_mean: Option<f64>,
+    /// Mean of no light where the line through darks of two exposure times or more has it at no time.
+    pub black: Option<f64>,
     /// R, samples per photon.
     pub responsivity: Option<f64>,
     /// Dark signal per second.
@@ -141,14 +108,15 @@ impl Curve {
     /// follows.
     pub fn of(flats: &[Level], darks: &[Level], scatter: &Scatter, settings: &Settings) -> Option<Self> {
         let rounding = settings.rounding();
-        let point = |level: &Level| Point4::of(level, scatter, settings.confidence);
+        let point = |level: &Level| Point4::of(level, scatter, settings);
+        let of_dark = |(dark, is_whole): (&Level, bool)| Point4 { is_whole, ..point(dark) };
         let are_darks_clipped = darks.iter().any(|dark| is_clipped(dark, rounding));
         let is_silent = rounding > 0.0 && darks.iter().all(|dark| dark.variance < LEAST_VARIANCE);
-        let hot = darks.iter().map(|dark| dark.at_ends[0]).fold(0.0, f64::max);
+        let hot = hot_share(darks);
         let mut curve = Self {
             beneath: Vec::new(),
             flats: flats.iter().map(point).collect(),
-            darks: darks.iter().map(point).collect(),
+            darks: darks.iter().zip(are_whole(darks)).map(of_dark).collect(),
             fitted: Vec::new(),
             patterned: Vec::new(),
             saturated: peak(flats),
@@ -168,10 +136,8 @@ impl Curve {
         let saturation = curve.saturated.map_or(f64::INFINITY, |peak| flats[peak].mean - no_light(peak));
         let whole = |highest: f64| -> Vec<usize> {
             let is_whole = |&index: &usize| {
-                let [at_top, at_bottom] = flats[index].at_ends;
-                let is_whole = at_top <= hot + FEW_AT_ENDS && (rounding <= 0.0 || at_bottom <= FEW_AT_ENDS);
-                let is_told = rounding <= 0.0 || flats[index].variance >= LEAST_VARIANCE;
-                is_whole && is_told && flats[index].mean - no_light(index) <= highest * saturation
+                let is_told = cut_off(&flats[index], hot, rounding).is_none();
+                is_told && flats[index].mean - no_light(index) <= highest * saturation
             };
             (0..flats.len()).filter(is_whole).collect()
         };
@@ -212,9 +178,14 @@ impl Curve {
         }
     }
 
-    /// How many exposure times the darks have.
+    /// Darks that the lines over time take.
+    fn whole_darks(&self) -> impl Iterator<Item = &Point4> {
+        self.darks.iter().filter(|dark| dark.is_whole)
+    }
+
+    /// How many exposure times the darks have of which no more photosites are cut off than of all.
     pub fn times(&self) -> usize {
-        let mut times: Vec<f64> = self.darks.iter().filter_map(|dark| dark.exposure_s).collect();
+        let mut times: Vec<f64> = self.whole_darks().filter_map(|dark| dark.exposure_s).collect();
         times.sort_by(f64::total_cmp);
         times.dedup_by(|a, b| (*a - *b).abs() <= SAME_TIME * b.abs());
         times.len()
@@ -227,7 +198,7 @@ impl Curve {
             let point = |(index, dark): (usize, &Point4)| {
                 Some(Point { x: dark.exposure_s?, y: of(dark), weight: weights.get(index).copied().unwrap_or(1.0) })
             };
-            self.darks.iter().enumerate().filter_map(point).collect()
+            self.darks.iter().enumerate().filter(|(_, dark)| dark.is_whole).filter_map(point).collect()
         };
         let mean = points(|dark| dark.mean.value, &weights.dark_mean);
         let variance = points(|dark| dark.variance.value, &weights.dark_variance);
@@ -251,14 +222,54 @@ impl Curve {
         self.flats[flat].mean.value - self.no_light(flat).map_or(0.0, |[mean, _]| mean)
     }
 
-    /// The exposure times in s of a flat and of the only darks, where these stand beneath it and are another's.
-    pub fn other_time(&self) -> Option<[f64; 2]> {
-        let differ = |(flat, beneath): (&Point4, &Beneath)| {
-            let Beneath::Dark(dark) = beneath else { return None };
-            let [of_flat, of_dark] = [flat.exposure_s?, self.darks[*dark].exposure_s?];
-            ((of_dark - of_flat).abs() > SAME_TIME * of_flat.abs()).then_some([of_flat, of_dark])
+    /// The exposure times in s of darks, the least and the largest, that stand beneath flats of another time, and the time of the
+    /// flat that is farthest off these; none where that is within them, or darks of all times are there.
+    pub fn other_time(&self) -> Option<([f64; 2], f64)> {
+        let times = || self.darks.iter().filter_map(|dark| dark.exposure_s);
+        let ends = [times().fold(f64::INFINITY, f64::min), times().fold(0.0, f64::max)];
+        let off = |(flat, beneath): (&Point4, &Beneath)| {
+            let time = flat.exposure_s?;
+            let is_other = match beneath {
+                Beneath::Dark(dark) => (self.darks[*dark].exposure_s? - time).abs() > SAME_TIME * time,
+                Beneath::Lines => !(ends[0]..=ends[1]).contains(&time),
+                Beneath::Unknown => false,
+            };
+            is_other.then(|| (time, (time / ends[1]).max(ends[0] / time)))
         };
-        self.flats.iter().zip(&self.beneath).find_map(differ)
+        let farthest = self.flats.iter().zip(&self.beneath).filter_map(off).max_by(|a, b| a.1.total_cmp(&b.1));
+        farthest.map(|(time, _)| (ends, time))
+    }
+
+    /// Whether some flats, or the only darks beneath them, do not tell their exposure time, and others do.
+    pub fn is_time_unknown(&self) -> bool {
+        let differ = |(flat, beneath): (&Point4, &Beneath)| match beneath {
+            Beneath::Dark(dark) => flat.exposure_s.is_some() != self.darks[*dark].exposure_s.is_some(),
+            _ => false,
+        };
+        self.flats.iter().zip(&self.beneath).any(differ)
+    }
+
+    /// Whether more photosites of some darks are cut off than of all.
+    pub fn are_darks_cut_off(&self) -> bool {
+        self.darks.iter().any(|dark| !dark.is_whole)
+    }
+
+    /// The whole charge of a flat, in samples: its mean above no light and no time; and how much more it may be, at most: where darks of
+    /// one time alone are there, the dark signal that their variance has room for. None where darks tell no black level.
+    pub fn charge(&self, flat: usize) -> Option<(Interval, f64)> {
+        let mean = &self.flats[flat].mean;
+        let Interval { value, low, high } = Interval::normal(mean.value, mean.scatter(), self.confidence);
+        if let Some(black) = self.interval(|values| values.black, self.confidence) {
+            let below = (value - low).hypot(black.high - black.value);
+            let above = (high - value).hypot(black.value - black.low);
+            let value = value - black.value;
+            return Some((Interval { value, low: value - below, high: value + above }, 0.0));
+        }
+        let values = self.values()?;
+        let (dark, variance) = (self.no_light(flat)?[0], values.dark_variance?);
+        // Shot noise of so much charge is all that darks are uncertain by.
+        let room = (variance - self.rounding).max(0.0) / values.gain;
+        Some((Interval { value: value - dark, low: low - dark, high: high - dark }, room))
     }
 
     /// Whether the mean of no light beneath a flat is known.
@@ -311,11 +322,15 @@ impl Curve {
     /// What scatters beneath a flat: of the mean and of the variance of no light.
     fn scatter_beneath(&self, flat: usize) -> [f64; 2] {
         match self.beneath[flat] {
-            Beneath::Dark(dark) => [self.darks[dark].mean.variance, self.darks[dark].variance.variance],
+            Beneath::Dark(dark) => [self.darks[dark].mean.scatter(), self.darks[dark].variance.scatter()],
             Beneath::Lines => {
-                let count = self.darks.len() as f64;
-                let mean = |of: fn(&Point4) -> f64| self.darks.iter().map(of).sum::<f64>() / (count * count);
-                [mean(|dark| dark.mean.variance), mean(|dark| dark.variance.variance)]
+                let count = self.whole_darks().count() as f64;
+                // What rounding hides does not average out.
+                let of = |of: fn(&Point4) -> Datum| {
+                    let hidden = self.whole_darks().map(|dark| of(dark).hidden).fold(0.0, f64::max);
+                    self.whole_darks().map(|dark| of(dark).variance).sum::<f64>() / (count * count) + hidden * hidden
+                };
+                [of(|dark| dark.mean), of(|dark| dark.variance)]
             }
             Beneath::Unknown => [0.0; 2],
         }
@@ -338,6 +353,7 @@ impl Curve {
             gain: line.slope,
             dark_variance: dark_variance.filter(|_| has_darks),
             dark_mean: mean.filter(|_| has_darks),
+            black: self.dark_lines().map(|[mean, _]| mean.offset).filter(|_| has_darks),
             responsivity: Line::through_zero(self.response_points()).map(|line| line.slope),
             dark_slope: lines.map(|[mean, _]| mean.slope).filter(|_| has_darks),
             dark_variance_slope: lines
@@ -349,24 +365,27 @@ impl Curve {
     /// The interval of a number that follows from the values, at such confidence; none where it does not follow.
     pub fn interval(&self, of: impl Fn(&Values) -> Option<f64>, confidence: f64) -> Option<Interval> {
         let value = of(&self.values()?)?;
-        let mut variance = 0.0;
+        let (mut variance, mut hidden) = (0.0, 0.0);
         let mut moved = self.clone();
         let mut add = |curve: &mut Self, datum: &dyn Fn(&mut Self) -> Option<&mut Datum>| {
-            let Some(Datum { value: at, variance: own }) = datum(curve).copied() else { return };
-            if own <= 0.0 {
+            let Some(Datum { value: at, variance: own, hidden: most }) = datum(curve).copied() else { return };
+            let step = if own > 0.0 { own.sqrt() } else { most };
+            if step <= 0.0 {
                 return;
             }
             let mut ends = [value; 2];
             for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
                 if let Some(datum) = datum(curve) {
-                    datum.value = at + sign * own.sqrt();
+                    datum.value = at + sign * step;
                 }
                 *end = curve.values().as_ref().and_then(&of).unwrap_or(value);
             }
             if let Some(datum) = datum(curve) {
                 datum.value = at;
             }
-            variance += ((ends[1] - ends[0]) / 2.0).powi(2);
+            let slope = (ends[1] - ends[0]) / 2.0;
+            variance += if own > 0.0 { slope.powi(2) } else { 0.0 };
+            hidden += (slope / step * most).abs();
         };
         for &flat in &self.fitted {
             add(&mut moved, &|curve| Some(&mut curve.flats[flat].mean));
@@ -385,7 +404,9 @@ impl Curve {
             moved.values().as_ref().and_then(&of).unwrap_or(value)
         });
         variance += ((ends[1] - ends[0]) / 2.0).powi(2);
-        Some(Interval::normal(value, variance, confidence))
+        let Interval { low, high, .. } = Interval::normal(value, variance, confidence);
+        // What rounding hides of one level it may hide of all alike, and no chance makes it less.
+        Some(Interval { value, low: low - hidden, high: high + hidden })
     }
 
     /// What the mean above no light scatters by: noise; black levels, whose frames scatter so; and what darks miss their line by.
@@ -395,48 +416,28 @@ impl Curve {
         let [noise, frames, levels] = match self.beneath[flat] {
             Beneath::Dark(dark) => [self.darks[dark].noise, 1.0 / self.darks[dark].frames, 1.0],
             Beneath::Lines => {
-                let count = self.darks.len() as f64;
-                let mean = |of: fn(&Point4) -> f64| self.darks.iter().map(of).sum::<f64>() / (count * count);
+                let count = self.whole_darks().count() as f64;
+                let mean = |of: fn(&Point4) -> f64| self.whole_darks().map(of).sum::<f64>() / (count * count);
                 [mean(|dark| dark.noise), mean(|dark| 1.0 / dark.frames), 1.0 / count]
             }
             Beneath::Unknown => [0.0; 3],
         };
-        let noise = Component { variance: own.noise + noise, ..Component::NONE };
+        let hidden = own.mean.hidden.hypot(self.hidden_beneath(flat));
+        let noise = Component { variance: own.noise + noise + hidden * hidden, ..Component::NONE };
         [noise, scatter.black.times(share + frames), self.dark_besides.times(1.0 + levels)]
     }
 
     /// What the mean above no light scatters by, a variance.
     pub fn signal_variance(&self, flat: usize) -> f64 {
-        self.flats[flat].mean.variance + self.scatter_beneath(flat)[0]
+        self.flats[flat].mean.scatter() + self.scatter_beneath(flat)[0]
     }
-}
 
-/// Whether code 0 cuts off what is beneath a dark, of codes whose error of rounding has such a variance.
-pub fn is_clipped(dark: &Level, rounding: f64) -> bool {
-    /// Of so few samples means and variances are those of all.
-    const FEW: f64 = 1e-3;
-    rounding > 0.0 && dark.at_ends[1] > FEW
-}
-
-/// Flats of light that is well below saturation, so that their means follow it, by their places.
-pub fn below_saturation(flats: &[Level]) -> Vec<usize> {
-    /// Of the mean that saturates.
-    const SHARE: f64 = 0.95;
-    /// More samples than these at the largest code, and means do not follow the light.
-    const FEW: f64 = 1e-3;
-    let reach = peak(flats).map_or(f64::INFINITY, |peak| SHARE * flats[peak].mean);
-    let is_below = |flat: &usize| flats[*flat].at_ends[0] <= FEW && flats[*flat].mean <= reach;
-    (0..flats.len()).filter(is_below).collect()
-}
-
-/// The flat of the largest temporal variance, where a brighter one has less beyond chance \[EMVA1288, Sec. 6.6].
-fn peak(flats: &[Level]) -> Option<usize> {
-    let (peak, largest) = flats.iter().enumerate().max_by(|(_, a), (_, b)| a.variance.total_cmp(&b.variance))?;
-    /// Standard deviations that are beyond chance.
-    const BEYOND: f64 = 5.0;
-    let falls = |after: &Level| {
-        let scatter = (after.variance_variance + largest.variance_variance).sqrt();
-        after.variance < largest.variance - BEYOND * scatter && after.variance < 0.9 * largest.variance
-    };
-    flats[peak + 1..].iter().any(falls).then_some(peak)
+    /// How far rounding may have the mean of no light beneath a flat off, at most.
+    fn hidden_beneath(&self, flat: usize) -> f64 {
+        match self.beneath[flat] {
+            Beneath::Dark(dark) => self.darks[dark].mean.hidden,
+            Beneath::Lines => self.whole_darks().map(|dark| dark.mean.hidden).fold(0.0, f64::max),
+            Beneath::Unknown => 0.0,
+        }
+    }
 }

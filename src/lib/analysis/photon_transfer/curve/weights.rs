@@ -27,8 +27,9 @@ impl Curve {
                     let beneath = self.scatter_beneath(flat);
                     let of_dark = if self.is_offset_free { 0.0 } else { beneath[1] };
                     relative / point.freedom * level.max(self.rounding).powi(2)
+                        + point.variance.hidden.powi(2)
                         + of_dark
-                        + line.slope.powi(2) * (point.mean.variance + beneath[0])
+                        + line.slope.powi(2) * (point.mean.scatter() + beneath[0])
                 })
                 .collect();
             let weighted = |besides: f64| {
@@ -51,12 +52,13 @@ impl Curve {
 
     fn weigh_darks(&mut self) {
         let weigh = |of: fn(&Point4) -> Datum, besides: f64| -> Vec<f64> {
-            self.darks.iter().map(|dark| 1.0 / (of(dark).variance + besides).max(f64::MIN_POSITIVE)).collect()
+            self.darks.iter().map(|dark| 1.0 / (of(dark).scatter() + besides).max(f64::MIN_POSITIVE)).collect()
         };
         let (means, variances) = (weigh(|dark| dark.mean, 0.0), weigh(|dark| dark.variance, 0.0));
         (self.weights.dark_mean, self.weights.dark_variance) = (means, variances);
-        let freedom = self.darks.len() as f64 - 2.0;
-        if self.times() < 2 || freedom <= 0.0 {
+        let freedom = self.whole_darks().count() as f64 - 2.0;
+        // What code 0 cuts off is no line.
+        if self.times() < 2 || freedom <= 0.0 || self.are_darks_clipped {
             return;
         }
         // A variance that is low by chance does not count more.
@@ -66,30 +68,30 @@ impl Curve {
             for (dark, weight) in self.darks.iter_mut().zip(&mut self.weights.dark_variance) {
                 let level = line.at(dark.exposure_s.unwrap_or(0.0)).max(self.rounding).max(0.5 * dark.variance.value);
                 dark.variance.variance = relative / dark.freedom * level * level;
-                *weight = 1.0 / dark.variance.variance.max(f64::MIN_POSITIVE);
+                *weight = 1.0 / dark.variance.scatter().max(f64::MIN_POSITIVE);
             }
         }
         for (which, of) in [|dark: &Point4| dark.mean, |dark: &Point4| dark.variance].into_iter().enumerate() {
             let points = |besides: f64| -> Vec<Point> {
                 let point = |dark: &Point4| {
-                    let weight = 1.0 / (of(dark).variance + besides).max(f64::MIN_POSITIVE);
+                    let weight = 1.0 / (of(dark).scatter() + besides).max(f64::MIN_POSITIVE);
                     Some(Point { x: dark.exposure_s?, y: of(dark).value, weight })
                 };
-                self.darks.iter().filter_map(point).collect()
+                self.whole_darks().filter_map(point).collect()
             };
             let misfit = |besides: f64| {
                 let points = points(besides);
                 Line::through(points.clone()).map_or(0.0, |line| line.chi_square(points))
             };
-            let largest = self.darks.iter().map(|dark| of(dark).value.powi(2)).fold(0.0, f64::max);
+            let largest = self.whole_darks().map(|dark| of(dark).value.powi(2)).fold(0.0, f64::max);
             let found = among(freedom, misfit, largest);
             let besides = found.known(self.confidence);
             if besides <= 0.0 {
                 continue;
             }
             if which == 0 {
-                self.dark_besides = found;
-                self.dark_told = off_line(misfit(0.0), freedom, found.variance);
+                let told = off_line(misfit(0.0), freedom, found.variance);
+                (self.dark_besides, self.dark_told) = (found, told);
             }
             for dark in &mut self.darks {
                 let datum = if which == 0 { &mut dark.mean } else { &mut dark.variance };
@@ -99,7 +101,7 @@ impl Curve {
             if which == 0 {
                 self.flats.iter_mut().for_each(|flat| flat.mean.variance += besides);
             }
-            let weights: Vec<f64> = self.darks.iter().map(|dark| 1.0 / of(dark).variance).collect();
+            let weights: Vec<f64> = self.darks.iter().map(|dark| 1.0 / of(dark).scatter()).collect();
             if which == 0 { self.weights.dark_mean = weights } else { self.weights.dark_variance = weights }
         }
     }
@@ -112,7 +114,7 @@ impl Curve {
         let weights = |besides: f64, share: f64| -> Vec<f64> {
             let own = |&flat: &usize| {
                 let (point, signal) = (&self.flats[flat], self.signal(flat));
-                let scatter = point.mean.variance + self.scatter_beneath(flat)[0];
+                let scatter = point.mean.scatter() + self.scatter_beneath(flat)[0];
                 scatter + besides + (share + point.light_variance) * signal.powi(2)
             };
             self.fitted.iter().map(|flat| 1.0 / own(flat).max(f64::MIN_POSITIVE)).collect()

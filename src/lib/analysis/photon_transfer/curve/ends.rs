@@ -1,0 +1,98 @@
+//! Samples at the ends of the codes, photosites that are full, and where flats saturate.
+
+use super::super::level::Level;
+use super::LEAST_VARIANCE;
+
+/// So many samples at an end, beyond those that darks have there, and what is measured of the others is no longer that of all.
+pub const FEW_AT_ENDS: f64 = 1e-5;
+
+/// Why samples of a flat are not those of all photosites, or tell no noise; none where they do. Darks have such a share of hot
+/// photosites at the largest code.
+pub fn cut_off(flat: &Level, hot: f64, rounding: f64) -> Option<&'static str> {
+    let [at_top, at_bottom] = flat.at_ends;
+    if at_top > hot + FEW_AT_ENDS {
+        Some("reach the largest code")
+    } else if rounding > 0.0 && at_bottom > FEW_AT_ENDS {
+        Some("reach code 0")
+    } else {
+        (rounding > 0.0 && flat.variance < LEAST_VARIANCE).then_some("have a variance that rounding hides")
+    }
+}
+
+/// The largest share of samples that darks have at the largest code.
+pub fn hot_share(darks: &[Level]) -> f64 {
+    darks.iter().map(|dark| dark.at_ends[0]).fold(0.0, f64::max)
+}
+
+/// Levels without the photosites that are at an end whether light falls or not: at the largest code in all darks, and at code 0 in
+/// all flats.
+pub fn without_stuck(levels: &[Level], [at_top, at_bottom]: [f64; 2]) -> Vec<Level> {
+    let without = |level: &Level| {
+        let [top, bottom] = level.at_ends;
+        Level { at_ends: [(top - at_top).max(0.0), (bottom - at_bottom).max(0.0)], ..level.clone() }
+    };
+    levels.iter().map(without).collect()
+}
+
+/// Shares of the photosites that are at the largest code in all darks, and at code 0 in all flats, where noise brings no others there.
+pub fn stuck_shares(flats: &[Level], darks: &[Level]) -> [f64; 2] {
+    /// More are no defects.
+    const MOST: f64 = 0.1;
+    /// Standard deviations that noise does not reach over.
+    const BEYOND: f64 = 6.0;
+    let least = |levels: &[Level], end: usize| {
+        let share = levels.iter().min_by(|a, b| a.at_ends[end].total_cmp(&b.at_ends[end]));
+        share
+            .filter(|level| end == 0 || level.mean > BEYOND * level.variance.sqrt())
+            .map_or(0.0, |level| level.at_ends[end])
+    };
+    [least(darks, 0), least(flats, 1)].map(|share| if share < MOST { share } else { 0.0 })
+}
+
+/// Which darks tell how the dark signal goes with time: of no more photosites than of all of them samples are cut off, at the largest
+/// code or where photosites are full.
+pub fn are_whole(darks: &[Level]) -> Vec<bool> {
+    let least = |of: fn(&Level) -> f64| darks.iter().map(of).fold(f64::INFINITY, f64::min) + FEW_AT_ENDS;
+    let [at_end, full] = [least(|dark| dark.at_ends[0]), least(|dark| dark.full)];
+    darks.iter().map(|dark| dark.at_ends[0] <= at_end && dark.full <= full).collect()
+}
+
+/// The mean from which on a photosite counts as full, by flats beyond saturation.
+pub fn full_mean(flats: &[Level]) -> Option<f64> {
+    /// Of the brightest flat: above it a signal does not follow the charge.
+    const SHARE: f64 = 0.9;
+    let mut flats = flats.to_vec();
+    flats.sort_by(|a, b| a.mean.total_cmp(&b.mean));
+    peak(&flats)?;
+    flats.last().map(|brightest| SHARE * brightest.mean)
+}
+
+/// Whether code 0 cuts off what is beneath a dark, of codes whose error of rounding has such a variance.
+pub fn is_clipped(dark: &Level, rounding: f64) -> bool {
+    /// Of so few samples means and variances are those of all.
+    const FEW: f64 = 1e-3;
+    rounding > 0.0 && dark.at_ends[1] > FEW
+}
+
+/// Flats of light that is well below saturation, so that their means follow it, by their places.
+pub fn below_saturation(flats: &[Level]) -> Vec<usize> {
+    /// Of the mean that saturates.
+    const SHARE: f64 = 0.95;
+    /// More samples than these at the largest code, and means do not follow the light.
+    const FEW: f64 = 1e-3;
+    let reach = peak(flats).map_or(f64::INFINITY, |peak| SHARE * flats[peak].mean);
+    let is_below = |flat: &usize| flats[*flat].at_ends[0] <= FEW && flats[*flat].mean <= reach;
+    (0..flats.len()).filter(is_below).collect()
+}
+
+/// The flat of the largest temporal variance, where a brighter one has less beyond chance \[EMVA1288, Sec. 6.6].
+pub(super) fn peak(flats: &[Level]) -> Option<usize> {
+    let (peak, largest) = flats.iter().enumerate().max_by(|(_, a), (_, b)| a.variance.total_cmp(&b.variance))?;
+    /// Standard deviations that are beyond chance.
+    const BEYOND: f64 = 5.0;
+    let falls = |after: &Level| {
+        let scatter = (after.variance_variance + largest.variance_variance).sqrt();
+        after.variance < largest.variance - BEYOND * scatter && after.variance < 0.9 * largest.variance
+    };
+    flats[peak + 1..].iter().any(falls).then_some(peak)
+}

@@ -1,0 +1,253 @@
+//! What the frames of all conditions tell: flats first, which show where photosites are full, then darks; and again without photosites
+//! that are stuck, where there are some.
+
+use super::checks::{check_same_light, end_of_codes};
+use super::conditions::{Group, Reading};
+use crate::analysis::photon_transfer::{
+    Asked, ClassFindings, Condition, Level, Picture, Settings, Site, Stuck, Survey, full_mean, of_class, survey_as,
+};
+use crate::error::{Error, Result};
+use crate::formats::many::OneOfMany;
+use crate::frame::Geometry;
+use crate::metadata::FrameHeader;
+use rayon::prelude::*;
+
+/// Frames of all conditions, and what was found of them.
+pub struct Surveys<'a> {
+    head: &'a FrameHeader,
+    groups: &'a [Group],
+    read: &'a Reading,
+    are_codes: bool,
+    /// The largest code: as it is said, or as the brightest flats show it.
+    pub largest: Option<f64>,
+    /// Whether that is said.
+    is_said: bool,
+    /// The mean from which on photosites count as full.
+    full: Option<f64>,
+    stuck: Stuck,
+    /// Condition by condition.
+    pub found: Vec<Survey>,
+}
+
+impl<'a> Surveys<'a> {
+    /// Reads all frames, which are like `head`.
+    ///
+    /// # Errors
+    ///
+    /// Those of the frames; [`Error::Data`] for frames of one condition that are not.
+    pub fn of(head: &'a FrameHeader, groups: &'a [Group], read: &'a Reading, are_codes: bool) -> Result<Self> {
+        let largest = head.metadata.white_level_adu.map(|white| white.largest());
+        let is_said = largest.is_some();
+        let (full, stuck, found) = (None, Stuck::default(), Vec::new());
+        let mut surveys = Self { head, groups, read, are_codes, largest, is_said, full, stuck, found };
+        surveys.read_all()?;
+        Ok(surveys)
+    }
+
+    fn read_all(&mut self) -> Result<()> {
+        let stacks = stacks(self.groups);
+        let mut found: Vec<Option<Survey>> = vec![None; self.groups.len()];
+        for is_lit in [true, false] {
+            let wanted = |(place, _): &(usize, &mut Option<Survey>)| self.groups[*place].condition.is_lit == is_lit;
+            let own: Vec<_> = found.iter_mut().enumerate().filter(wanted).collect();
+            own.into_par_iter().with_max_len(1).try_for_each(|(place, survey)| -> Result<()> {
+                *survey = Some(self.survey(place, stacks.contains(&place))?);
+                Ok(())
+            })?;
+            if is_lit {
+                self.full = self.full_mean(&found);
+            }
+        }
+        self.found = found.into_iter().flatten().collect();
+        if !self.is_said && self.are_codes {
+            self.largest = end_of_codes(self.groups, &mut self.found);
+        }
+        Ok(())
+    }
+
+    /// The least mean of full photosites of all classes that saturate.
+    fn full_mean(&self, found: &[Option<Survey>]) -> Option<f64> {
+        let of = |class: &String| {
+            let lit = (0..found.len()).filter_map(|place| Some((place, found[place].as_ref()?)));
+            full_mean(&lit.map(|(place, survey)| self.level(class, place, survey)).collect::<Vec<_>>())
+        };
+        self.classes().iter().filter_map(of).reduce(f64::min)
+    }
+
+    /// Reads the frames of a condition.
+    fn survey(&self, place: usize, keeps: bool) -> Result<Survey> {
+        /// Files that other groups may have open meanwhile.
+        const OTHERS: usize = 64;
+        let group = &self.groups[place];
+        let options = group.files.iter().map(|file| self.read.options(file)).collect();
+        let mut frames = OneOfMany::open_all(options, OTHERS)?;
+        for frame in &mut frames {
+            self.read.describe(frame.header_mut())?;
+        }
+        let top = self.largest.filter(|_| self.is_said);
+        let full = self.full.filter(|_| !group.condition.is_lit);
+        let found = survey_as(&mut frames, &Asked { top, full, stuck: Some(&self.stuck), keeps })?;
+        for site in &found.sites {
+            if let Some((frame, mean)) =
+                site.frame_means.iter().enumerate().find(|(_, mean)| top.is_some_and(|top| **mean > top))
+            {
+                let (file, top) = (group.files[frame].display(), top.unwrap_or_default());
+                let problem =
+                    format!("{file}: its mean is {mean:.1}, above the largest code, {top}; name the right one");
+                return Err(Error::Usage(problem).change(&["white"]));
+            }
+            check_same_light(group, &site.frame_means, top)?;
+        }
+        if let Some([one, other]) = found.sites.iter().find_map(|site| site.copies) {
+            let [one, other] = [one, other].map(|frame| group.files[frame].display());
+            let problem = format!("{one} and {other}: their samples are the same, or differ by one number alone");
+            return Err(Error::Data(problem + "; copies of one exposure do not count as two"));
+        }
+        Ok(found)
+    }
+
+    /// Names of the classes.
+    fn classes(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for site in Site::of(self.head) {
+            if !names.contains(&site.class) {
+                names.push(site.class);
+            }
+        }
+        names
+    }
+
+    fn level(&self, class: &str, place: usize, survey: &Survey) -> Level {
+        let sites = Site::of(self.head);
+        let own = sites.iter().zip(&survey.sites).filter(|(site, _)| site.class == class);
+        Level::of(place, self.groups[place].condition, own.map(|(_, survey)| survey.clone()).collect())
+    }
+
+    /// What is measured of each class, with the pictures of what patterns are measured on.
+    ///
+    /// # Errors
+    ///
+    /// Those of the frames.
+    pub fn measured(&mut self, temperature_k: Option<f64>, settings: &Settings) -> Result<Vec<ClassFindings>> {
+        let classes = self.findings(temperature_k, settings);
+        self.keep_pictures(&classes)?;
+        let Some(all) = self.stuck_photosites(&classes)? else { return Ok(classes) };
+        self.stuck = all.few();
+        let mut classes = classes;
+        if self.stuck.is_any() {
+            self.read_all()?;
+            classes = self.findings(temperature_k, settings);
+            self.keep_pictures(&classes)?;
+        }
+        for class in &mut classes {
+            class.stuck = self.stuck.of_class(&class.name);
+            let share = all.share(&class.name);
+            if !class.stuck.is_empty() {
+                let count = class.stuck.len();
+                class.notes.push(format!(
+                    "photosites that hold one value with light and without are left out of all numbers: {count}, which `defects.stuck` of \
+                     the JSON names"
+                ));
+            } else if share > 0.0 {
+                class.doubts.push(format!(
+                    "{:.1} % of the photosites do not follow the light, which are too many to be left out: they count in all numbers",
+                    share * 100.0
+                ));
+            }
+        }
+        Ok(classes)
+    }
+
+    fn keep_pictures(&mut self, classes: &[ClassFindings]) -> Result<()> {
+        for (place, _) in classes.iter().flat_map(|class| class.stacks).flatten() {
+            self.keep_picture(place)?;
+        }
+        Ok(())
+    }
+
+    fn keep_picture(&mut self, place: usize) -> Result<()> {
+        if self.found[place].picture.is_none() {
+            let kept = self.survey(place, true)?;
+            let end = self.found[place].sites.iter().map(|site| site.at_ends);
+            // What is at the largest code may have been counted with that taken from all.
+            let ends: Vec<[u64; 2]> = end.collect();
+            self.found[place] = kept;
+            self.found[place].sites.iter_mut().zip(ends).for_each(|(site, ends)| site.at_ends = ends);
+        }
+        Ok(())
+    }
+
+    /// Photosites that hold one value, by a flat and the dark of the time nearest to its own; none where there are none, or no dark.
+    fn stuck_photosites(&mut self, classes: &[ClassFindings]) -> Result<Option<Stuck>> {
+        let both = classes.iter().find_map(|class| Some([class.stacks[0]?.0, class.stacks[1]?.0]));
+        let Some(places) = both.or_else(|| self.light_and_dark()) else { return Ok(None) };
+        for place in places {
+            self.keep_picture(place)?;
+        }
+        let picture = |place: usize| {
+            let survey = &self.found[place];
+            let noise = survey.sites.iter().map(|site| site.variance / site.frames as f64).collect();
+            survey.picture.as_deref().map(|means| Picture { means, noise })
+        };
+        let [light, dark] = places.map(picture);
+        let Some((light, dark)) = light.zip(dark) else { return Ok(None) };
+        let Geometry { width, channels, .. } = &self.head.geometry;
+        let found = Stuck::of(&Site::of(self.head), [*width, channels.len()], [&dark, &light], self.are_codes);
+        Ok(found.is_any().then_some(found))
+    }
+
+    /// The flat nearest to the middle of all, and the dark nearest to its time.
+    fn light_and_dark(&self) -> Option<[usize; 2]> {
+        let mean = |place: usize| {
+            let sites = &self.found[place].sites;
+            sites.iter().map(|site| site.mean).sum::<f64>() / sites.len() as f64
+        };
+        let of_kind =
+            |is_lit: bool| (0..self.groups.len()).filter(move |place| self.groups[*place].condition.is_lit == is_lit);
+        let black = of_kind(false).map(mean).reduce(f64::min)?;
+        let middle = f64::midpoint(black, of_kind(true).map(mean).reduce(f64::max)?);
+        let off = |place: &usize| (mean(*place) - middle).abs();
+        let flat = of_kind(true).min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        let time = |place: usize| self.groups[place].condition.exposure_s.unwrap_or(0.0);
+        let apart = |place: &usize| (time(*place) - time(flat)).abs();
+        Some([flat, of_kind(false).min_by(|a, b| apart(a).total_cmp(&apart(b)))?])
+    }
+
+    /// What levels of each class tell.
+    fn findings(&self, temperature_k: Option<f64>, settings: &Settings) -> Vec<ClassFindings> {
+        let light = |level: &Level| {
+            let Condition { photons, exposure_s, .. } = level.condition;
+            [photons.or(exposure_s).unwrap_or(0.0), level.mean]
+        };
+        let by_photons =
+            self.groups.iter().filter(|group| group.condition.is_lit).all(|group| group.condition.photons.is_some());
+        let of = |name: &String| {
+            let levels = |wanted: &dyn Fn(&Condition) -> bool| -> Vec<Level> {
+                let own = (0..self.groups.len()).filter(|place| wanted(&self.groups[*place].condition));
+                own.map(|place| self.level(name, place, &self.found[place])).collect()
+            };
+            let is_of_it =
+                |condition: &Condition| condition.temperature_k == temperature_k || condition.temperature_k.is_none();
+            let mut flats = levels(&|condition| condition.is_lit && is_of_it(condition));
+            let darks = levels(&|condition| !condition.is_lit && is_of_it(condition));
+            flats.sort_by(|a, b| {
+                let ([light_a, mean_a], [light_b, mean_b]) = (light(a), light(b));
+                let by_light = if by_photons { light_a.total_cmp(&light_b) } else { std::cmp::Ordering::Equal };
+                by_light.then(mean_a.total_cmp(&mean_b))
+            });
+            of_class(name, &flats, &darks, &levels(&|condition| !condition.is_lit), settings)
+        };
+        self.classes().par_iter().map(of).collect()
+    }
+}
+
+/// The conditions of the most frames, one with light and one without, where they are alone in that.
+fn stacks(groups: &[Group]) -> Vec<usize> {
+    let of_kind = |is_lit: bool| {
+        let own = || groups.iter().enumerate().filter(move |(_, group)| group.condition.is_lit == is_lit);
+        let most = own().map(|(_, group)| group.files.len()).max()?;
+        let mut with_most = own().filter(move |(_, group)| group.files.len() == most).map(|(place, _)| place);
+        with_most.next().filter(|_| with_most.next().is_none())
+    };
+    [true, false].into_iter().filter_map(of_kind).collect()
+}
