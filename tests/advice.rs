@@ -53,9 +53,9 @@ const MISSING: &[Advice] = &[
     ),
     advice(
         "demosaic plane.exr --metadata plane.yaml --sensor kaf-5101ce --sigma -o out.exr",
-        "no `exposure`; give --exposure S and --f-number N",
+        "no `exposure_time_s`; give --exposure S",
         &[
-            "demosaic plane.exr --metadata plane.yaml --sensor kaf-5101ce --sigma --exposure 0.033 --f-number 8 -o out.exr",
+            "demosaic plane.exr --metadata plane.yaml --sensor kaf-5101ce --sigma --exposure 0.033 -o out.exr",
             "demosaic plane.exr --metadata exposed.yaml --sensor kaf-5101ce --sigma -o out.exr",
         ],
     ),

@@ -70,15 +70,23 @@ fn darks_of_another_scale_or_gain_are_told() {
     for (name, scale, gain, told) in darks {
         let bright = name == "doubled";
         write(&shop, "light.fits", &[], if bright { sky(3000.0, 9000.0, 1) } else { sky(0.0, 9000.0, 1) });
-        if name == "loud" {
-            write(&shop, "light.fits", &[], sky(0.0, 300.0, 1));
+        // A half of the frame lies below what was scaled, and one scatters by less than what is loud.
+        let least = [("scaled", 3000.0), ("loud", 300.0)].into_iter().find(|(of, _)| *of == name);
+        if let Some((_, high)) = least {
+            write(&shop, "light.fits", &[], sky(0.0, high, 1));
         }
         // Factors that are no whole numbers leave no step, where codes are not rounded first.
         let whole = move |code: f64| if scale.fract() == 0.0 { code.round() } else { code };
         let codes = move |seed| move |x, y| scale * whole(500.0 + gain * 5.0 * 6_f64.sqrt() * chance(x, y, seed));
         write(&shop, "dark.fits", &[], codes(2));
         write(&shop, "other.fits", &[], codes(3));
-        for more in ["", "--dark other.fits", "--dark other.fits --combine median"] {
+        write(&shop, "third.fits", &[], codes(4));
+        for more in [
+            "",
+            "--dark other.fits",
+            "--dark other.fits --combine median",
+            "--dark other.fits --dark third.fits --combine median",
+        ] {
             let line = format!("correct-frame light.fits --white 16383 -o out.exr --dark dark.fits {more}");
             let said = shop.said(line.trim_end(), 0);
             // Nothing but a black level tells it of light that is bright throughout, as a mean of two is of less noise.
@@ -175,4 +183,16 @@ fn samples_heaped_at_the_top_are_told_where_nothing_else_tells_them() {
     assert!(said.contains("pixels were made of saturated samples") && !said.contains("largest value"), "{said}");
     write(&shop, "light.fits", &[], sky(300.0, 9000.0, 1));
     assert_eq!(shop.said("demosaic light.fits --black 500 -o rgb.exr", 0), "");
+    // Flats are cut off too.
+    write(&shop, "dark.fits", &[], |x, y| 500.0 + 12.0 * chance(x, y, 5));
+    write(&shop, "flat.fits", &[], |x, y| sky(3000.0, 9000.0, 2)(x, y).min(8000.0));
+    let line = "correct-frame light.fits --dark dark.fits --flat flat.fits --flat-dark dark.fits -o c.exr";
+    let said = shop.said(line, 0);
+    assert!(said.contains("photosites of the flats are at their largest value") && said.contains("--white N"), "{said}");
+    let said = shop.said(&format!("{line} --white 8000"), 0);
+    assert!(said.contains("photosites of the flats are saturated") && !said.contains("largest value"), "{said}");
+    // All at the largest code of 12 bits.
+    write(&shop, "light.fits", &[], |_, _| 4095.0);
+    let said = shop.said("measure light.fits", 0);
+    assert!(said.contains("12288 of its samples are at the largest value, 4095"), "{said}");
 }

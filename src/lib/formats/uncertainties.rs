@@ -1,7 +1,7 @@
 //! Columns of tables of spectra that are no spectra but how sure others are.
 
 /// What such columns are called, alone or with what they are of.
-const WORDS: [&str; 17] = [
+const WORDS: [&str; 25] = [
     "uncertainty",
     "uncertainties",
     "uncert",
@@ -19,6 +19,14 @@ const WORDS: [&str; 17] = [
     "err",
     "deviation",
     "rmse",
+    "variance",
+    "ci95",
+    "u95",
+    "±",
+    "unsicherheit",
+    "messunsicherheit",
+    "standardabweichung",
+    "incertitude",
 ];
 
 /// The places of the curves that are none; nothing where all are spectra, or none is.
@@ -45,7 +53,10 @@ pub(super) fn told(name: &str, columns: &[String], kept: &[usize]) -> String {
 /// Whether a heading, without its unit, has such a word.
 fn is_one(heading: &str) -> bool {
     let bare = heading.split(['(', '[']).next().unwrap_or_default().to_lowercase();
-    bare.split(|letter: char| !letter.is_alphanumeric()).any(|word| WORDS.contains(&word))
+    // As the Guide to the expression of uncertainty in measurement writes it.
+    let is_function = heading.trim_start().starts_with("u(");
+    is_function
+        || bare.split(|letter: char| !(letter.is_alphanumeric() || letter == '±')).any(|word| WORDS.contains(&word))
 }
 
 #[cfg(test)]
@@ -55,8 +66,18 @@ mod tests {
 
     #[test]
     fn uncertainties_are_no_spectra() {
-        for heading in ["uncertainty (%)", "std", "L_std", "Sigma [W m-2 sr-1 nm-1]", "σ", "radiance error", "u unc."]
-        {
+        for heading in [
+            "u(L) [%]",
+            "zenith ±",
+            "Unsicherheit",
+            "uncertainty (%)",
+            "std",
+            "L_std",
+            "Sigma [W m-2 sr-1 nm-1]",
+            "σ",
+            "radiance error",
+            "u unc.",
+        ] {
             assert!(is_one(heading), "{heading}");
         }
         for heading in ["radiance (W m-2 sr-1 nm-1)", "standard white", "sky", "sdss", "x (std)", "30"] {

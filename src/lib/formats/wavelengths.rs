@@ -24,6 +24,10 @@ pub(super) fn check_order(wavelength_nm: &[f64]) -> std::result::Result<(), Stri
     let (count, places) = if up.0 <= down.0 { up } else { down };
     match places.as_slice() {
         [place] if count > 0 && wavelength_nm.len() >= LEAST => {
+            let own = wavelength_nm[*place];
+            if wavelength_nm.iter().filter(|nm| **nm == own).count() > 1 {
+                return Err(twice(own));
+            }
             let nm = |place: usize| wavelength_nm.get(place).map(f64::to_string);
             let before = place.checked_sub(1).and_then(nm);
             let beside = match (before, nm(place + 1)) {
@@ -33,17 +37,21 @@ pub(super) fn check_order(wavelength_nm: &[f64]) -> std::result::Result<(), Stri
             };
             Err(format!(
                 "the wavelength {} nm stands {beside} nm, and all others are in order: mend it, or put it in its place",
-                wavelength_nm[*place]
+                own
             ))
         }
         _ => Ok(()),
     }
 }
 
+fn twice(nm: f64) -> String {
+    format!("the wavelength {nm} nm stands there twice; leave out one")
+}
+
 /// Refuses a wavelength that stands twice among ascending ones.
 fn check_unlike(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
     match wavelength_nm.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(format!("the wavelength {} nm stands there twice; leave out one", pair[0])),
+        Some(pair) => Err(twice(pair[0])),
         None => Ok(()),
     }
 }

@@ -3,6 +3,7 @@
 pub mod averages;
 pub mod distribution;
 pub mod gauss;
+pub mod largest;
 pub mod least_squares;
 pub mod medians;
 pub mod moments;

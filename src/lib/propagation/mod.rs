@@ -4,6 +4,7 @@
 //! [`gains`] and [`pixel_moments`] what becomes of them when each pixel is a weighted sum of many, [`paper`] the equations
 //! of \[HP2005], [`frame`] how the head of a frame leads to its moments.
 
+mod amplitudes;
 mod bent;
 pub mod budget;
 mod charge;

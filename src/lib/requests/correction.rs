@@ -333,7 +333,18 @@ impl Correction {
         if let Some((flats, means)) = &flats {
             warnings.extend_from_slice(flats.warnings());
             if means.full > 0 {
-                warnings.push(format!("{} photosites of the flats are saturated; they are marked", means.full));
+                warnings.push(format!(
+                    "{} photosites of the flats are saturated; they are marked, and the mean by which the others of their class are \
+                     divided counts them at less than they had",
+                    means.full
+                ));
+            }
+            if means.heaped > 0 {
+                warnings.push(format!(
+                    "{} photosites of the flats are at their largest value, as saturated ones are, and no white level tells that they \
+                     are; give --white N",
+                    means.heaped
+                ));
             }
         }
         warnings.extend(beyond.and_then(doubt_of_limits));

@@ -137,7 +137,12 @@ pub fn of_bent_codes(frame: &FrameHeader) -> Option<Note> {
 /// and would be near it.
 pub fn of_slope(frame: &FrameHeader) -> Option<Note> {
     let (adc, readout) = (frame.metadata.adc?, frame.metadata.sensor.as_ref()?.readout.as_ref()?);
-    let range_e = f64::from(adc.top_code()) / readout.full_well_e;
+    doubt_of_slope(&adc, readout.full_well_e)
+}
+
+/// The same of a converter behind such a full well.
+pub(super) fn doubt_of_slope(adc: &AdcRecord, full_well_e: f64) -> Option<Note> {
+    let range_e = f64::from(adc.top_code()) / full_well_e;
     let is_near = |slope: f64| (0.25..4.0).contains(&(slope / range_e));
     let (slope, inverse) = (adc.adu_per_e, adc.adu_per_e.recip());
     (!(0.05..20.0).contains(&(slope / range_e)) && is_near(inverse)).then(|| {

@@ -8,6 +8,7 @@ use crate::camera::levels::BlackLevels;
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, MasterNoise, Scene};
+use crate::numerics::largest::Largest;
 use crate::stages::darks::{DarkFrames, DarkSettings, check_alike, check_codes, check_setting};
 use crate::stages::defects::{Survey, add};
 use crate::stages::masters::Frames;
@@ -48,6 +49,8 @@ pub struct FlatMeans {
     photosites: Vec<u64>,
     /// Photosites that are saturated in a flat.
     pub full: u64,
+    /// Photosites at one largest value, as saturated ones are, where no level tells whether they are.
+    pub heaped: u64,
     /// Ordinary values of g, by class.
     limits: Option<Vec<[f64; 2]>>,
 }
@@ -181,6 +184,7 @@ impl<S: RowSource> FlatFrames<S> {
         let (width, planes, classes) = (geometry.width, geometry.channels.len(), self.classes.count());
         let mut sums = vec![0.0; classes];
         let (mut counts, mut full) = (vec![0_u64; classes], vec![0_u64; classes]);
+        let mut largest_of = vec![Largest::default(); classes];
         let mut survey = beyond.map(|_| Survey::new(classes, width * geometry.height));
         let step = geometry.cached_rows();
         while self.rows_made < geometry.height {
@@ -195,6 +199,7 @@ impl<S: RowSource> FlatFrames<S> {
                     if flat.is_finite() {
                         sums[class] += flat;
                         counts[class] += 1;
+                        largest_of[class].take(std::iter::once(largest));
                         full[class] += u64::from(is_full(self.full, x, y, plane, *largest));
                     }
                     if let Some(survey) = &mut survey {
@@ -214,13 +219,15 @@ impl<S: RowSource> FlatFrames<S> {
             if 2 * full[class] > counts[class] {
                 return Err(self
                     .head
-                    .refuse("most of its samples are saturated; expose flat fields to half of full well"));
+                    .refuse("most samples of a class are saturated; expose flat fields to half of full well"));
             }
         }
         let in_shares = |[low, high]: [f64; 2], mean: f64| [low / mean, high / mean];
         let limits = survey.zip(beyond).map(|(survey, beyond)| survey.limits(beyond, 1e-6));
         let limits = limits.map(|limits| limits.into_iter().zip(&means).map(|(l, mean)| in_shares(l, *mean)).collect());
-        Ok(FlatMeans { means, photosites: counts, full: full.iter().sum(), limits })
+        let heaps = largest_of.iter().filter(|_| self.full.is_none()).filter_map(Largest::heap);
+        let heaped = heaps.map(|(_, count)| count).sum();
+        Ok(FlatMeans { means, photosites: counts, full: full.iter().sum(), heaped, limits })
     }
 
     /// What metadata keep of them.

@@ -462,7 +462,7 @@ mod tests {
             ("W m-2 sr-1 Hz-1", PerFrequency),
             ("W m-2 sr-1", AllWavelengths),
             ("W.m^-2.sr^-1", AllWavelengths),
-            ("10^-4 W m-2 sr-1 nm-1", Scaled),
+            ("10 000 W m-2 sr-1 nm-1", Scaled),
             ("radiance (100 W cm-2 sr-1 nm-1)", Scaled),
             ("radiance (1000 W m-2 sr-1 nm-1)", Scaled),
             ("3 × 10⁻³ W m⁻² sr⁻¹ nm⁻¹", Scaled),

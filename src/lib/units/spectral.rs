@@ -400,7 +400,7 @@ mod tests {
     use crate::units::heading::unit_of_heading;
 
     /// Spellings, and what one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
-    const RADIANCES: [(&str, f64); 72] = [
+    const RADIANCES: [(&str, f64); 76] = [
         ("W cm-2 sr-1 nm-1", 1.0),
         ("W m-2 sr-1 nm-1", 1e-4),
         ("W.m^-2.sr^-1.nm^-1", 1e-4),
@@ -449,6 +449,10 @@ mod tests {
         ("10⁻³ W m⁻² sr⁻¹ nm⁻¹", 1e-7),
         ("10**-3 W/(m**2 sr nm)", 1e-7),
         ("1e-6 W cm-2 sr-1 nm-1", 1e-6),
+        ("1e-10 W cm-2 sr-1 nm-1", 1e-10),
+        ("10^-4 W m-2 sr-1 nm-1", 1e-8),
+        ("0.01 W m-2 sr-1 nm-1", 1e-6),
+        ("1e2 mW m-2 sr-1 nm-1", 1e-5),
         ("0.001 W m-2 sr-1 nm-1", 1e-7),
         ("1/nm W/(m2 sr)", 1e-4),
         ("W 1/m2 1/sr 1/um", 1e-7),

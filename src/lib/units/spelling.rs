@@ -1,5 +1,7 @@
 //! Units as people write them, taken to pieces: every spelling of powers and products to one.
 
+use std::borrow::Cow;
+
 /// A unit of power in which radiance is given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Power {
@@ -10,6 +12,8 @@ pub(super) enum Power {
     Nanowatt,
     /// 10⁻⁷ W, that of CGS.
     ErgPerSecond,
+    /// A power of ten of W for which there is no word.
+    TenTo(i8),
 }
 
 impl Power {
@@ -23,18 +27,21 @@ impl Power {
         const ROUNDING: f64 = 1e-9;
         let is_scale = number.contains(['e', 'E']) || number.starts_with("0.");
         let factor: f64 = number.parse().ok().filter(|_| is_scale)?;
-        Self::ALL.into_iter().find(|unit| (unit.in_w() / (self.in_w() * factor) - 1.0).abs() < ROUNDING)
+        let watts = self.in_w() * factor;
+        let is_so = |unit: &Self| (unit.in_w() / watts - 1.0).abs() < ROUNDING;
+        Self::ALL.into_iter().chain((-30..=30).map(Self::TenTo)).find(is_so)
     }
 
-    pub(super) fn symbol(self) -> &'static str {
-        match self {
+    pub(super) fn symbol(self) -> Cow<'static, str> {
+        Cow::Borrowed(match self {
             Self::Kilowatt => "kW",
             Self::Watt => "W",
             Self::Milliwatt => "mW",
             Self::Microwatt => "uW",
             Self::Nanowatt => "nW",
             Self::ErgPerSecond => "erg s-1",
-        }
+            Self::TenTo(exponent) => return Cow::Owned(format!("1e{exponent} W")),
+        })
     }
 
     pub(super) fn in_w(self) -> f64 {
@@ -45,6 +52,7 @@ impl Power {
             Self::Microwatt => 1e-6,
             Self::Nanowatt => 1e-9,
             Self::ErgPerSecond => 1e-7,
+            Self::TenTo(exponent) => 10_f64.powi(exponent.into()),
         }
     }
 }

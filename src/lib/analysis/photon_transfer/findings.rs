@@ -179,12 +179,12 @@ pub fn of_class(
         add(key, over_gain(told.ok_or_else(|| reasons.of_noise())));
     }
     // The signal that equals its noise: ½ + √(¼ + σ²) [EMVA1288, Eq. 25].
-    let threshold = |v: &Values| Some(0.5 + (0.25 + v.dark_variance?.max(0.0) / (v.gain * v.gain)).sqrt());
-    let threshold_e = number(&threshold, no_darks());
+    let noise_square = |v: &Values| Some(v.dark_variance? / (v.gain * v.gain));
+    let threshold = |square: f64| 0.5 + (0.25 + square.max(0.0)).sqrt();
+    let threshold_e = number(&noise_square, no_darks()).map(|square| square.map(threshold));
     add("threshold_e", threshold_e.clone());
-    let threshold_photons = |v: &Values| Some(threshold(v)? * v.gain / v.responsivity?);
-    let lacking = threshold_e.as_ref().err().or(responsivity.as_ref().err()).cloned();
-    add("threshold_photons", number(&threshold_photons, lacking.unwrap_or_default()));
+    let efficiency = number(&|v| Some(v.responsivity? / v.gain), no_photons());
+    add("threshold_photons", threshold_e.clone().and_then(|threshold| Ok(over(threshold, efficiency?))));
     let limit = Limit::of(&curve, flats, settings);
     let [saturation_e, saturation_photons, full_well] = limit.capacities(reasons, gain.clone());
     add("saturation_e", saturation_e.clone());

@@ -18,6 +18,8 @@ const TERMS: u32 = 30;
 const SMOOTH: f64 = 2.0;
 /// Smaller variances the terms do not resolve, in codes².
 const RESOLVED: f64 = 1e-4;
+/// Variances of noise that reaches no second edge from half way between two codes, 5 standard deviations off, in codes².
+const ALIKE: f64 = 1e-2;
 /// The error of rounding, in codes².
 const EVEN: f64 = 1.0 / 12.0;
 
@@ -43,6 +45,8 @@ impl Hidden {
         }
         // Between the codes noise shows most, at a code least.
         let [least, most] = [(low, -1.0), (variance.max(RESOLVED), 1.0)].map(|(variance, sign)| before(variance, sign));
+        // Half way between two codes all noise below a tenth of a code looks alike.
+        let least = if least < ALIKE { 0.0 } else { least };
         let even = variance - EVEN;
         let sum = |of: fn(f64) -> f64| (1..=TERMS).map(|k| of(f64::from(k)) * wave(k, least)).sum::<f64>();
         Self {

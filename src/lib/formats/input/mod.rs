@@ -211,8 +211,7 @@ impl FrameReader {
         // Only what our programs made marks what they mean by it.
         let is_ours = !metadata.history.is_empty();
         let kept = first_channel..first_channel + geometry.channels.len();
-        let mask = stored.channels.iter().position(|channel| channel == MASK_LAYER);
-        let mask = mask.filter(|at| is_ours && !kept.contains(at));
+        let mask = stored.channels.iter().position(|of| of == MASK_LAYER).filter(|at| is_ours && !kept.contains(at));
         notes.extend(kept::left_out(name, left_out));
         let check = metadata.samples.as_ref().zip(sidecar).map(|(samples, sidecar)| DigestCheck {
             digest: SamplesDigest::like(&samples.digest),

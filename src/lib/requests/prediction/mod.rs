@@ -1,5 +1,6 @@
 //! Predicting noise: from a scene, or a library of them, to noise budgets by formula.
 
+mod doubts;
 mod sweep;
 
 pub use sweep::Sweep;
@@ -214,6 +215,12 @@ impl NoisePrediction {
     pub fn run(&self) -> Result<PredictedNoise> {
         let mut found = if self.all_samples { self.of_library()? } else { self.of_scene()? };
         found.notes.extend(self.noise.doubt());
+        found.notes.extend(match &found.budgets {
+            Budgets::Scene(scene) => doubts::of_cut(scene),
+            // It goes through full well.
+            Budgets::Sweep(_) => None,
+            Budgets::Samples(_) => doubts::of_cuts(&found.budgets.scenes()),
+        });
         let first_order = found.budgets.scenes().into_iter().filter_map(|scene| scene.first_order);
         if let Some(void) = first_order.into_iter().find(|first_order| !first_order.holds) {
             found.notes.push(Note::Warning(format!(
@@ -240,6 +247,7 @@ impl NoisePrediction {
         if self.sweep.is_some() && electrons == [0.0; 3] {
             return Err(Error::Usage("a sweep scales the signal of a scene, but this one is dark".into()));
         }
+        notes.extend(doubts::of_converter(sensor.readout()?));
         let color = self.color(&sensor, &mut notes)?;
         let is_absolute = color.as_ref().is_some_and(|color| !color.is_relative) && self.sweep.is_none();
         let true_xyz = radiance.filter(|_| is_absolute).and_then(|radiance| {
@@ -285,6 +293,7 @@ impl NoisePrediction {
         };
         let mut notes: Vec<Note> =
             warnings.into_iter().map(Note::Warning).chain(doubts).chain(base.doubts().map(Note::Warning)).collect();
+        notes.extend(doubts::of_converter(loaded.sensor.readout()?));
         let color = self.color(&loaded.sensor, &mut notes)?;
         let one = |sample: usize| -> Result<SamplePrediction> {
             let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;

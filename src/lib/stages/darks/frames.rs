@@ -111,7 +111,7 @@ impl<S: RowSource> DarkFrames<S> {
         self.fitness.misfit()
     }
 
-    /// What makes whole numbers of what comes off: the number of frames of a mean, 2 of a median; none of several averages, of scaled
+    /// What makes sums of codes of what comes off: the number of frames of a mean, of a median 1, or 2 of an even number; none of several averages, of scaled
     /// and of clipped ones.
     fn factor(&self) -> Option<f64> {
         let [Master { record, .. }] = self.stack.masters.as_slice() else { return None };
@@ -120,7 +120,7 @@ impl<S: RowSource> DarkFrames<S> {
             _ if record.weight != 1.0 || self.stack.level.is_some() => None,
             _ if frames == 1 => Some(1.0),
             Combine::Mean => Some(frames.into()),
-            Combine::Median => Some(2.0),
+            Combine::Median => Some(if frames.is_multiple_of(2) { 2.0 } else { 1.0 }),
             Combine::Clipped => None,
         }
     }

@@ -332,7 +332,10 @@ struct Dose {
 
 impl Dose {
     fn of(frame: &FrameHeader, heads: &[&FrameHeader], warnings: &mut Vec<String>) -> Self {
-        let unknown = std::iter::once(&frame).chain(heads).find(|head| head.metadata.temperature_k().is_none());
+        // Without any time no temperature matters.
+        let needs_none = |head: &FrameHeader| head.metadata.time_s() == Some(0.0);
+        let is_unknown = |head: &&&FrameHeader| head.metadata.temperature_k().is_none() && !needs_none(head);
+        let unknown = std::iter::once(&frame).chain(heads).find(is_unknown);
         if let Some(head) = unknown {
             warnings.push(format!(
                 "{}: its temperature is not known; dark signals are scaled by exposure alone",
@@ -348,12 +351,16 @@ impl Dose {
     }
 }
 
-/// What the converter adds; where that is not known, the black level, with a warning.
+/// What the converter adds; where that is not known, the black level, with a warning, or the bias of the sensor.
 fn bias_level(frame: &FrameHeader, warnings: &mut Vec<String>) -> Result<BlackLevels> {
     if let Some(adc) = frame.metadata.adc {
         return Ok(BlackLevels::uniform_at(adc.bias_adu));
     }
-    let level = frame.black_levels()?.ok_or_else(|| frame.missing("black_level_adu"))?;
+    let Some(level) = frame.black_levels()? else {
+        let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
+        let bias = readout.map(|readout| BlackLevels::uniform_at(readout.bias_adu));
+        return bias.ok_or_else(|| frame.missing("black_level_adu"));
+    };
     warnings
         .push(format!("{}: its black level is taken for the bias, beside which dark signals are scaled", frame.name));
     Ok(level)

@@ -1,7 +1,10 @@
 //! Samples at the ends of the codes, photosites that are full, and where flats saturate.
 
 use super::super::level::Level;
-use super::LEAST_VARIANCE;
+
+/// Below this temporal variance in codes² nothing is known of noise: without any, codes have as much half way between two of them.
+/// The standard's limit is 0.24 \[EMVA1288, Sec. 6.4].
+pub const LEAST_VARIANCE: f64 = 0.25;
 
 /// So many samples at an end, beyond those that darks have there, and what is measured of the others is no longer that of all.
 pub const FEW_AT_ENDS: f64 = 1e-5;

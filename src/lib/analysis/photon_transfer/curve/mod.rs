@@ -14,7 +14,9 @@ mod ends;
 mod point;
 mod weights;
 
-pub use ends::{are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, stuck_shares, without_stuck};
+pub use ends::{
+    LEAST_VARIANCE, are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, stuck_shares, without_stuck,
+};
 
 use super::fit::{Line, Point};
 use super::level::Level;
@@ -25,9 +27,6 @@ use crate::numerics::variance_components::Interval;
 use ends::peak;
 use point::{Datum, Point4};
 
-/// Below this temporal variance in codes² nothing is known of noise: without any, codes have as much half way between two of them.
-/// The standard's limit is 0.24 \[EMVA1288, Sec. 6.4].
-pub const LEAST_VARIANCE: f64 = 0.25;
 /// The fits end at this share of saturation [EMVA1288, Sec. 6.5].
 const HIGHEST: f64 = 0.7;
 /// Patterns under light are measured to this share of saturation: few photosites see a tenth more than the mean.
