@@ -188,11 +188,32 @@ fn samples_heaped_at_the_top_are_told_where_nothing_else_tells_them() {
     write(&shop, "flat.fits", &[], |x, y| sky(3000.0, 9000.0, 2)(x, y).min(8000.0));
     let line = "correct-frame light.fits --dark dark.fits --flat flat.fits --flat-dark dark.fits -o c.exr";
     let said = shop.said(line, 0);
-    assert!(said.contains("photosites of the flats are at their largest value") && said.contains("--white N"), "{said}");
+    assert!(
+        said.contains("photosites of the flats are at their largest value") && said.contains("--white N"),
+        "{said}"
+    );
     let said = shop.said(&format!("{line} --white 8000"), 0);
     assert!(said.contains("photosites of the flats are saturated") && !said.contains("largest value"), "{said}");
     // All at the largest code of 12 bits.
     write(&shop, "light.fits", &[], |_, _| 4095.0);
     let said = shop.said("measure light.fits", 0);
     assert!(said.contains("12288 of its samples are at the largest value, 4095"), "{said}");
+}
+
+/// The sensor of the frames has a bias of 500 ADU.
+#[test]
+fn levels_far_from_the_bias_of_a_sensor_that_is_named_are_told() {
+    let shop = Workshop::new();
+    sensor(&shop, 0.0);
+    write(&shop, "light.fits", &[], sky(300.0, 9000.0, 1));
+    for (black, is_told) in [(0, true), (300, true), (480, false), (500, false), (700, false), (4000, true)] {
+        let said = shop.said(&format!("demosaic light.fits --sensor s.yaml --black {black} -o rgb.exr"), 0);
+        let told = format!("--black {black} is far from the bias of");
+        assert_eq!(said.contains(&told), is_told, "{black}: {said}");
+    }
+    for (level, is_told) in [(100.0, true), (450.0, false), (520.0, false)] {
+        write(&shop, "dark.fits", &[], |x, y| level + 12.0 * chance(x, y, 5));
+        let said = shop.said("correct-frame light.fits --sensor s.yaml --dark dark.fits -o c.exr", 0);
+        assert_eq!(said.contains("ADU at least"), is_told, "{level}: {said}");
+    }
 }

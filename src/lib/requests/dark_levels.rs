@@ -46,7 +46,7 @@ pub(super) fn least_level(frame: &FrameHeader, is_bias: bool) -> Option<f64> {
         match metadata.bias_adu().filter(|_| is_bias) {
             Some(bias) => Some(MOST_OF_BLACK * bias),
             None if is_bias => black.map(|black| black / MOST_OF_BIAS),
-            None => black.map(|black| MOST_OF_BLACK * black),
+            None => black.or(metadata.bias_adu()).map(|level| MOST_OF_BLACK * level),
         }
     };
     by_converter.or_else(|| share().filter(|least| *least > 0.0 && metadata.adc.is_none()))

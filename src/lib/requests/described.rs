@@ -273,7 +273,31 @@ pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>>
             format!("{}: --black {said} is not below {LARGEST_CODE}, the largest code of 16 bits", frame.name);
         return Err(Error::Usage(problem).change(&["black"]));
     }
-    Ok(other_black(frame, black))
+    Ok(other_black(frame, black).or_else(|| of_another_sensor(frame, black)))
+}
+
+/// A warning of a level to subtract from codes of a camera that is far from the bias of the sensor which is named; what it counts of dark
+/// signal is a small share of the range.
+fn of_another_sensor(frame: &FrameHeader, black: BlackLevel) -> Option<Note> {
+    const NEAR: [f64; 2] = [0.75, 1.5];
+    const OF_RANGE: f64 = 0.03;
+    let metadata = &frame.metadata;
+    let are_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
+    if !are_codes || metadata.adc.is_some() || metadata.black_level_adu.is_some() || metadata.correction.is_some() {
+        return None;
+    }
+    let sensor = metadata.sensor.as_ref()?;
+    let readout = sensor.readout.as_ref()?;
+    let (level, bias) = (black.mean(), readout.bias_adu);
+    let most = (NEAR[1] * bias).max(bias + OF_RANGE * (f64::from((1_u32 << readout.bits) - 1) - bias));
+    (level < NEAR[0] * bias || level > most).then(|| {
+        Note::Warning(format!(
+            "{}: --black {} is far from the bias of {}, {bias} ADU",
+            frame.name,
+            in_words(&black.sites()),
+            sensor.name
+        ))
+    })
 }
 
 /// A warning of a level to subtract that the metadata contradict.
