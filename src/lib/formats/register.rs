@@ -174,10 +174,10 @@ pub fn announce(outputs: &[Option<&Path>]) -> Result<()> {
 
 /// Notes what makes a result doubtful and was found out too late to refuse it: an image that its sidecar does not describe.
 pub(crate) fn doubt(text: String) {
-    if let Some(register) = &mut *register() {
-        if !register.doubts.contains(&text) {
-            register.doubts.push(text);
-        }
+    if let Some(register) = &mut *register()
+        && !register.doubts.contains(&text)
+    {
+        register.doubts.push(text);
     }
 }
 

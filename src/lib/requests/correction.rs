@@ -20,7 +20,7 @@ use crate::stages::black::Black;
 use crate::stages::correct::{CorrectFrame, CorrectionSettings};
 use crate::stages::darks::{DarkFrames, DarkLimits, DarkSettings};
 use crate::stages::defects::{DefectMap, beyond_chance, lost_beyond};
-use crate::stages::flats::FlatFrames;
+use crate::stages::flats::{FlatFrames, FlatMeans};
 use crate::stages::masters::Averaging;
 use crate::stream::{RowSource, Stage};
 use clap::{ArgGroup, Args};
@@ -332,20 +332,7 @@ impl Correction {
         };
         if let Some((flats, means)) = &flats {
             warnings.extend_from_slice(flats.warnings());
-            if means.full > 0 {
-                warnings.push(format!(
-                    "{} photosites of the flats are saturated; they are marked, and the mean by which the others of their class are \
-                     divided counts them at less than they had",
-                    means.full
-                ));
-            }
-            if means.heaped > 0 {
-                warnings.push(format!(
-                    "{} photosites of the flats are at their largest value, as saturated ones are, and no white level tells that they \
-                     are; give --white N",
-                    means.heaped
-                ));
-            }
+            warnings.extend(doubts_of_flats(means));
         }
         warnings.extend(beyond.and_then(doubt_of_limits));
         let sources =
@@ -425,6 +412,25 @@ fn doubt_of_limits(beyond: f64) -> Option<String> {
             100.0 * variance
         )
     })
+}
+
+/// Warnings of flats that are saturated, or look so.
+fn doubts_of_flats(means: &FlatMeans) -> impl Iterator<Item = String> {
+    let full = (means.full > 0).then(|| {
+        format!(
+            "{} photosites of the flats are saturated; they are marked, and the mean by which the others of their class are divided \
+             counts them at less than they had",
+            means.full
+        )
+    });
+    let heaped = (means.heaped > 0).then(|| {
+        format!(
+            "{} photosites of the flats are at their largest value, as saturated ones are, and no white level tells that they are; give \
+             --white N",
+            means.heaped
+        )
+    });
+    full.into_iter().chain(heaped)
 }
 
 /// A warning of a frame that dark frames come off and that is one itself: a shell gives `--dark` the first of several names.

@@ -1,10 +1,10 @@
 //! What saturates: photosites that are full, or the converter, which has no larger code.
 
 use super::curve::{Curve, LEAST_VARIANCE};
-use super::findings::{Found, over};
 use super::level::Level;
 use super::reasons::{CLIPPED, Reasons, UNSATURATED};
 use super::settings::Settings;
+use super::sheet::{Found, over};
 use crate::numerics::variance_components::Interval;
 
 /// Where flats end, and what ends there.

@@ -1,11 +1,11 @@
 //! What levels tell of a class whose gain they do not tell: black level and dark noise in codes.
 
 use super::curve::{LEAST_VARIANCE, Values, is_clipped};
-use super::findings::{ClassFindings, CurvePoint, DarkPoint, Found, KEYS, finding};
 use super::level::Level;
 use super::reasons::{CLIPPED, no_darks, silent};
 use super::scatter::Scatter;
 use super::settings::Settings;
+use super::sheet::{ClassFindings, CurvePoint, DarkPoint, Found, KEYS, finding};
 use super::suspects::suspects;
 use crate::numerics::variance_components::Interval;
 
