@@ -50,12 +50,13 @@ impl Largest {
         self.0.truncate(VALUES);
     }
 
-    /// The largest value and how many samples have it, where that is a heap.
-    pub fn heap(&self) -> Option<(f32, u64)> {
+    /// The largest value and how many samples have it, where that is a heap; of few values only if no level is known beside which they
+    /// would be plain.
+    pub fn heap(&self, is_level_known: bool) -> Option<(f32, u64)> {
         let (&(value, count), others) = self.0.split_first()?;
         let most = others.iter().map(|(_, count)| *count).max().unwrap_or_default();
-        // Of a frame that is nearly all saturated the largest code of a converter tells.
-        let is_told = self.0.len() >= LEAST_VALUES || is_largest_code(value);
+        // Of a frame that is nearly all saturated the largest code of a converter tells, where no other is known.
+        let is_told = self.0.len() >= LEAST_VALUES || !is_level_known && is_largest_code(value);
         (is_told && count >= LEAST_HEAP && count >= ABOVE_OTHERS * most).then_some((value, count))
     }
 }
@@ -67,7 +68,7 @@ mod tests {
     fn heap(samples: impl IntoIterator<Item = f32>) -> Option<(f32, u64)> {
         let mut plane = Largest::default();
         plane.take(samples.into_iter().collect::<Vec<_>>().iter());
-        plane.heap()
+        plane.heap(false)
     }
 
     #[test]
@@ -85,6 +86,9 @@ mod tests {
         // Nearly all at the largest code of 12 bits.
         assert_eq!(heap([4095.0; 40].into_iter().chain([4000.0])), Some((4095.0, 40)));
         assert_eq!(heap([4000.0; 40]), None);
+        let mut known = Largest::default();
+        known.take([4095.0; 40].iter());
+        assert_eq!(known.heap(true), None);
         // The tail of coarse noise: each code is rarer than that before.
         assert_eq!(
             heap((0..20_u16).flat_map(|code| std::iter::repeat_n(f32::from(code), 20 - usize::from(code)))),

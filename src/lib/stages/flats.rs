@@ -225,7 +225,7 @@ impl<S: RowSource> FlatFrames<S> {
         let in_shares = |[low, high]: [f64; 2], mean: f64| [low / mean, high / mean];
         let limits = survey.zip(beyond).map(|(survey, beyond)| survey.limits(beyond, 1e-6));
         let limits = limits.map(|limits| limits.into_iter().zip(&means).map(|(l, mean)| in_shares(l, *mean)).collect());
-        let heaps = largest_of.iter().filter(|_| self.full.is_none()).filter_map(Largest::heap);
+        let heaps = largest_of.iter().filter(|_| self.full.is_none()).filter_map(|largest| largest.heap(false));
         let heaped = heaps.map(|(_, count)| count).sum();
         Ok(FlatMeans { means, photosites: counts, full: full.iter().sum(), heaped, limits })
     }

@@ -54,8 +54,9 @@ impl TopCheck {
     pub fn end(&self, frame: &FrameHeader) {
         let levels = FullLevels::of(frame).filter(|_| samples_tell(frame)).map(|levels| levels.classes());
         let lowest = levels.map_or(f32::INFINITY, |levels| levels.into_iter().fold(f32::INFINITY, f32::min));
-        let heaps: Vec<(f32, u64)> =
-            self.planes.iter().filter_map(Largest::heap).filter(|(value, _)| *value < lowest).collect();
+        let is_level_known = frame.metadata.white_level_adu.is_some() || frame.metadata.adc.is_some();
+        let heaps = self.planes.iter().filter_map(|plane| plane.heap(is_level_known));
+        let heaps: Vec<(f32, u64)> = heaps.filter(|(value, _)| *value < lowest).collect();
         let Some((value, _)) = heaps.iter().max_by_key(|(_, count)| *count) else { return };
         let count: u64 = heaps.iter().map(|(_, count)| count).sum();
         let advice = match (levels, frame.metadata.demosaic.is_some()) {
