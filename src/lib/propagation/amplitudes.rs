@@ -10,11 +10,12 @@ pub(super) const REACH: f64 = 40.0;
 /// Values of what photosites differ in that are gone through at most.
 const MOST_NODES: usize = 6000;
 
-/// Where what is read bends, and over what width.
+/// Where what is read bends, over what width, and how many widths off nothing is left of it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Knee {
     pub at: f64,
     pub width: f64,
+    pub reach: f64,
 }
 
 /// Rounding that shows: the distance from code to code, how far it does, and what blurs it: a standard deviation, and how its
@@ -78,7 +79,8 @@ pub(super) fn smooth_for(share: f64) -> f64 {
 /// Places and weights of an exponential number of mean 1 for a function that bends at `knees`; none of too many.
 pub(super) fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
     static SMOOTH_NODES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(10));
-    const WIDEST: f64 = 4.0;
+    // e^(−t) grows by the panel: on each of these 12 nodes sum it to 10⁻¹³ of the whole.
+    const WIDEST: [f64; 5] = [0.0, 4.0, 10.0, 20.0, REACH];
     const NARROWEST: f64 = 1e-4;
     // Of a bend as wide as w means the twentieth derivative is below √19!/w²⁰, and ten nodes are off by (10!)²/20! times that: 2·10⁻¹¹.
     const SMOOTH_WIDTH: f64 = 5.0;
@@ -88,14 +90,13 @@ pub(super) fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f6
     if near.is_empty() && codes.is_none() {
         return Some(SMOOTH_NODES.clone());
     }
-    let mut ends: Vec<f64> = (0..).map(|step| WIDEST * f64::from(step)).take_while(|end| *end < REACH).collect();
-    ends.push(REACH);
+    let mut ends = WIDEST.to_vec();
     for knee in near {
-        ends.push(knee.at);
+        // A step has nodes of its own to either side; of a bend 12 nodes follow five widths to 10⁻¹⁰.
+        ends.extend((knee.width < NARROWEST).then_some(knee.at));
         let width = knee.width.max(NARROWEST);
         let mut distance = 2.5 * width;
-        // Farther off nothing is left of the bend.
-        while distance < REACH.min(24.0 * width) {
+        while distance < REACH.min(knee.reach * width) {
             ends.extend([knee.at - distance, knee.at + distance]);
             distance *= 3.0;
         }
@@ -120,7 +121,7 @@ mod tests {
     /// n! for moments; e^(−a t) for what is no polynomial, with knees and codes alike.
     #[test]
     fn nodes_integrate_exponential_numbers() {
-        let knee = |at: f64, width: f64| Knee { at, width };
+        let knee = |at: f64, width: f64| Knee { at, width, reach: 9.0 };
         let cases = [
             (vec![], None),
             (vec![knee(0.7, 0.01), knee(-0.1, 0.2), knee(30.0, 2.0)], None),

@@ -13,6 +13,7 @@
 use super::effort;
 use super::node::Node;
 use super::reading::{Moments, Reading};
+use super::straight::Straight;
 use crate::numerics::gauss::{NODES, interpolated, panel};
 use crate::numerics::normal::{cumulative, density};
 use crate::numerics::rounding::REACH;
@@ -288,6 +289,12 @@ fn add_beyond(
     nodes.sort_by(|a, b| a.mean.total_cmp(&b.mean));
     let reach = |node: &Node| (REACH * node.std + direction * (node.mean - full)).min(full - node.floor);
     let farthest = nodes.iter().map(reach).fold(0.0, f64::max);
+    let has_floors = nodes.iter().any(|node| node.floor.is_finite());
+    if let Some(straight) = Straight::of(open, full, full + direction * farthest).filter(|_| !has_floors) {
+        effort::spend(nodes.len() as u64);
+        nodes.iter().for_each(|node| add(sum, sign * node.weight, straight.beyond(node, direction)));
+        return;
+    }
     let stds = nodes.iter().map(|node| node.std);
     let is_narrow = |std: &f64| *std < MANY * code;
     let widest = stds.clone().fold(0.0, f64::max);

@@ -132,13 +132,13 @@ fn moments_of_codes(frame: &FrameHeader, codes: &Photosite, expected_e: [f64; 3]
     };
     let Some(correction) = &frame.metadata.correction else {
         let bias_adu = codes.adc.map_or(0.0, |adc| adc.bias_adu);
-        let above_bias = expected_e.map(|mean| shifted(codes.moments(mean), -bias_adu));
+        let above_bias = of_classes(codes, expected_e).map(|code| shifted(code, -bias_adu));
         let left = transferred(frame, codes, above_bias, 1.0 / 12.0)?;
         return Ok(left.map(|code| shifted(code, bias_adu)));
     };
     if codes.flat.is_none() {
         let black_adu = subtracted(correction.black_adu, correction.black_deltas)?;
-        return Ok(expected_e.map(|mean| shifted(codes.moments(mean), -black_adu)));
+        return Ok(of_classes(codes, expected_e).map(|code| shifted(code, -black_adu)));
     }
     let mut classes = [Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0); 3];
     for (class, prediction) in classes.iter_mut().enumerate() {
@@ -146,6 +146,19 @@ fn moments_of_codes(frame: &FrameHeader, codes: &Photosite, expected_e: [f64; 3]
         *prediction = found.ok_or_else(|| codes.why_not_divided(class, expected_e[class]))?;
     }
     Ok(classes)
+}
+
+/// Moments of the codes of all classes; none from the first on that takes too long, since nothing is said of a frame then.
+fn of_classes(codes: &Photosite, expected_e: [f64; 3]) -> [Prediction; 3] {
+    let mut is_void = false;
+    expected_e.map(|expected_e| {
+        if is_void {
+            return Prediction::of_cumulants(f64::NAN, f64::NAN, f64::NAN, f64::NAN);
+        }
+        let found = codes.moments(expected_e);
+        is_void = found.moments.variance.is_nan();
+        found
+    })
 }
 
 /// Codes of photosites as the record of a frame's corrections has them.

@@ -260,8 +260,10 @@ impl Law {
             }
             if node.floor == f64::NEG_INFINITY && (is_full_far || node.mean + reach <= full) {
                 add(node.weight, reading.at(node.mean, node.std * node.std));
-            } else if node.std <= 0.0 || node.mean - reach >= full || node.floor >= full {
-                add(node.weight, reading.at(node.mean.min(full), 0.0));
+            } else if node.mean - reach >= full || node.floor >= full {
+                add(node.weight, at_full);
+            } else if node.std <= 0.0 {
+                add(node.weight, reading.at(node.mean, 0.0));
             } else {
                 near.push(node);
             }

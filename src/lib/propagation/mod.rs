@@ -48,6 +48,7 @@ pub mod saturation;
 pub mod smooth_hue;
 mod spaces;
 mod steps;
+mod straight;
 mod tails;
 pub mod tapped;
 mod tapped_sampling;

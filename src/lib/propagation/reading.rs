@@ -125,6 +125,21 @@ impl Reading {
         }
     }
 
+    /// The slope by the charge and the variance of the error of readings that are straight from one charge to another; none where
+    /// codes show, are not straight, or end.
+    pub fn straight_between(&self, low: f64, high: f64) -> Option<(f64, f64)> {
+        let square = self.noise_e * self.noise_e;
+        match self.asked {
+            Asked::Electrons => Some((1.0, square)),
+            Asked::Codes(adc, _) if !self.is_bent() && self.visible_code_e().is_none() => {
+                let ([lower, upper], reach) = (self.rails_e(), REACH * self.noise_e);
+                let is_free = low - reach > lower && high + reach < upper;
+                is_free.then_some((adc.adu_per_e, adc.adu_per_e * adc.adu_per_e * square + 1.0 / 12.0))
+            }
+            _ => None,
+        }
+    }
+
     /// Whether all charges between two are read as one code, with their read noise.
     pub fn is_one(&self, least: f64, most: f64) -> bool {
         let reach = REACH * self.noise_e;

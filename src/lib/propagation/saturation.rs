@@ -98,9 +98,15 @@ fn shares_from(frame: &FrameHeader, least_e: f64, code: f64) -> Option<[f64; 3]>
         }
         of(&photosite.model)
     };
-    let shares = expected_e.map(share);
-    // What takes too long is no number.
-    shares.iter().all(|share| !share.is_nan()).then_some(shares)
+    let mut shares = [0.0; 3];
+    for (found, expected_e) in shares.iter_mut().zip(expected_e) {
+        *found = share(expected_e);
+        // What takes too long is no number.
+        if found.is_nan() {
+            return None;
+        }
+    }
+    Some(shares)
 }
 
 /// The expected share of the pixels of a demosaicked frame that used a full sample; of a frame far from its edges.

@@ -251,7 +251,9 @@ impl Photosite {
             knees.extend(self.levels_e().map(|level_e| {
                 let shot = if model.dark_shot { (level_e - cold.mean).max(1.0) } else { 0.0 };
                 let width = (cold.variance + shot + model.added().powi(2) + model.tails.rts_e.powi(2)).sqrt();
-                Knee { at: (level_e - cold.mean) / hot_e, width: width / hot_e }
+                // Jumps bend it apart from the rest.
+                let reach = if model.tails.has_rts() { 24.0 } else { 9.0 };
+                Knee { at: (level_e - cold.mean) / hot_e, width: width / hot_e, reach }
             }));
             // So bright few are that it does not matter whether they are cut off.
             let variance = cold.variance + model.added().powi(2);
@@ -287,7 +289,11 @@ impl Photosite {
             let mean_e = cold.mean.min(model.full_well_e);
             let width = (cold.variance + model.added().powi(2)).sqrt();
             let ends = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
-            knees.extend(ends.map(|end| Knee { at: (end - mean_e).abs() / amplitude_e, width: width / amplitude_e }));
+            knees.extend(ends.map(|end| Knee {
+                at: (end - mean_e).abs() / amplitude_e,
+                width: width / amplitude_e,
+                reach: 24.0,
+            }));
             let quiet = model.at(&State { hot: 0.0, trap: 0.0 });
             if adc.adu_per_e * blur_e(&quiet, &adc, light_e) < BLURRED {
                 let [period, blur] = [1.0 / adc.adu_per_e, quiet.added()].map(|width_e| width_e / amplitude_e);
