@@ -123,7 +123,7 @@ fn drifting(curve: &Curve, flats: &[Level]) -> Option<String> {
 /// A response that bends, which the variances follow and their scatter hides.
 fn bent(curve: &Curve, confidence: f64) -> Option<String> {
     /// What is as sure is beyond chance.
-    const SURE: f64 = 0.9999;
+    const SURE: f64 = 0.999;
     let Bend { missed, scatter, freedom } = curve.bend()?;
     let gain = curve.interval(|values| Some(values.gain), confidence)?;
     let width = (gain.high - gain.low) / (2.0 * gain.value);
