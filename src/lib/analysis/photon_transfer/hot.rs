@@ -80,6 +80,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::to_sample;
     use crate::random::philox::philox4x32_10;
 
     /// Of 40 000 photosites that differ by 2, 800 have an excess of mean 60: the share and the mean come back within 4 standard deviations,
@@ -95,7 +96,7 @@ mod tests {
         let of = |share: f64| -> Option<HotTail> {
             let value = |index: usize| {
                 let hot = if chance(index, 20) < share { -60.0 * chance(index, 21).ln() } else { 0.0 };
-                (100.0 + 2.0 * normal(index) + hot) as f32
+                to_sample(100.0 + 2.0 * normal(index) + hot)
             };
             let picture: Vec<f32> = (0..SIDE * SIDE).map(value).collect();
             let site = Site { class: "Y".into(), plane: 0, first: [0, 0], step: [1, 1], size: [SIDE, SIDE] };
