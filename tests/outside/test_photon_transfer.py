@@ -137,47 +137,63 @@ class ReferenceSet(unittest.TestCase):
 
 
 class Drawn:
-    """A monochrome camera of 12 bits as numpy draws it: K 0.3, black 100.25 ADU, full well 12000 e-, read noise and dark current as they are given."""
+    """A monochrome camera of 12 bits as numpy draws it: K 0.3, black 100.25 ADU, full well 12000 e- where nothing else is given. From frame to
+    frame its black level jitters, and the light flickers, by standard deviations."""
 
     GAIN, BLACK, FULL_WELL, EFFICIENCY, PRNU, SIZE = 0.3, 100.25, 12000.0, 0.5, 0.01, (96, 128)
     SHARES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.4, 1.8)
 
-    def __init__(self, seed, read_e=6.0, dark_e_per_s=500.0, dcnu=0.1, hot_share=0.0, hot_e_per_s=0.0, held=()):
+    def __init__(self, seed, read_e=6.0, dark_e_per_s=500.0, dcnu=0.1, hot_share=0.0, hot_e_per_s=0.0, held=(), dsnu_e=1.0, flicker=0.0, jitter_adu=0.0, **other):
         self.random = numpy.random.default_rng(seed)
+        vars(self).update({name.upper(): value for name, value in other.items()})
+        self.flicker, self.jitter_adu = flicker, jitter_adu
         draw = lambda std: std * self.random.standard_normal(self.SIZE)
-        self.response, self.offset = 1 + draw(self.PRNU), draw(1.0)
+        self.response, self.offset = 1 + draw(self.PRNU), draw(dsnu_e)
         self.rate = dark_e_per_s * (1 + draw(dcnu)).clip(0)
         self.rate += (self.random.random(self.SIZE) < hot_share) * self.random.exponential(max(hot_e_per_s, 1e-9), self.SIZE)
         self.read_e, self.held = read_e, held
 
     def frame(self, light_e, time_s):
+        light_e *= 1 + self.flicker * self.random.standard_normal()
         charge = numpy.minimum(self.random.poisson(light_e * self.response + self.rate * time_s), self.FULL_WELL)
         noisy = charge + self.offset + self.read_e * self.random.standard_normal(self.SIZE)
-        codes = numpy.rint(self.GAIN * noisy + self.BLACK).clip(0, 4095).astype(numpy.uint16)
+        black = self.BLACK + self.jitter_adu * self.random.standard_normal()
+        codes = numpy.rint(self.GAIN * noisy + black).clip(0, 4095).astype(numpy.uint16)
         for (y, x), code in self.held:
             codes[y, x] = code
         return codes
 
-    def measured(self, flat_s, darks_s):
-        """What the program finds, and what it says; flats are as long as they are bright where they have no time of their own."""
+    def frames(self, flat_s, darks_s, stack=8, shares=SHARES):
+        """Kind, light in e-, time and codes of each; flats are as long as they are bright where they have no time of their own."""
+        found = []
+        for share in shares:
+            time_s = flat_s or 0.02 * share
+            found += [("flat", share * self.FULL_WELL, time_s, self.frame(share * self.FULL_WELL, time_s)) for _ in range(stack if share == 0.5 else 2)]
+        for index, time_s in enumerate(darks_s):
+            found += [("dark", 0.0, time_s, self.frame(0.0, time_s)) for _ in range(2 if index else stack)]
+        return found
+
+    def told(self, frames, options=("--white", "4095"), is_timed=True, photons=lambda light_e: light_e, sensor=None):
+        """What the program says of such frames: its channel, none where it refuses them, and its warnings."""
         with tempfile.TemporaryDirectory() as folder:
-            folder, rows = pathlib.Path(folder), ["File,Kind,EXPOSURE_S,photons"]
-
-            def put(kind, light_e, time_s, count):
-                for _ in range(count):
-                    name = f"{len(rows)}.png"
-                    Image.fromarray(self.frame(light_e, time_s)).save(folder / name)
-                    rows.append(f"{name},{kind},{time_s},{light_e / self.EFFICIENCY if kind == 'flat' else ''}")
-
-            for share in self.SHARES:
-                put("flat", share * self.FULL_WELL, flat_s or 0.02 * share, 8 if share == 0.5 else 2)
-            for index, time_s in enumerate(darks_s):
-                put("dark", 0.0, time_s, 2 if index else 8)
+            folder, rows = pathlib.Path(folder), ["File,Kind,photons" + (",EXPOSURE_S" if is_timed else "")]
+            for number, (kind, light_e, time_s, codes) in enumerate(frames):
+                Image.fromarray(codes).save(folder / f"{number}.png", compress_level=1)
+                counted = photons(light_e) / self.EFFICIENCY if kind == "flat" else ""
+                rows.append(f"{number}.png,{kind},{counted}" + (f",{time_s}" if is_timed else ""))
             (folder / "list.csv").write_text("\n".join(rows) + "\n")
-            command = [BINARIES / "photon-transfer", folder / "list.csv", "--white", "4095", "--cfa", "monochrome", "--output-format", "json"]
-            told = subprocess.run(command, check=True, capture_output=True, timeout=300, text=True)
-        [channel] = json.loads(told.stdout)["channels"]
+            command = [BINARIES / "photon-transfer", folder / "list.csv", *options, "--cfa", "monochrome", "--output-format", "json"]
+            command += ["--sensor-out", sensor] if sensor else []
+            told = subprocess.run(command, capture_output=True, timeout=300, text=True)
+        channel = json.loads(told.stdout)["channels"][0] if told.returncode == 0 else None
         return channel, told.stderr
+
+    def measured(self, flat_s, darks_s, **how):
+        """What the program finds, and what it says."""
+        channel, said = self.told(self.frames(flat_s, darks_s), **how)
+        if channel is None:
+            raise AssertionError(said)
+        return channel, said
 
 
 class DrawnCameras(unittest.TestCase):
@@ -229,6 +245,119 @@ class DrawnCameras(unittest.TestCase):
             self.assertLessEqual(channel["defects"]["light"]["count"], 1)
             for key, truth in ("prnu", Drawn.PRNU), ("dcnu", 0.1), ("gain_adu_per_e", Drawn.GAIN):
                 self.assertLess(abs(channel[key]["value"] / truth - 1), 0.05, key)
+
+
+    def test_dark_noise_of_silent_darks_has_no_dark_charge_in_it(self):
+        """Of 51 e- of dark charge in the flats, and darks whose noise rounding hides, the noise is that of no time; of one time that is said."""
+        outside = {"dark_noise_e": 0, "gain_adu_per_e": 0}
+        for seed in range(20):
+            camera = Drawn(seed, read_e=1.83, dark_e_per_s=102.0, dcnu=0.0, gain=0.05, full_well=60_000.0)
+            camera.DARKS_S = (0.05, 0.1, 0.25, 0.5)
+            channel, said = camera.measured(0.5, camera.DARKS_S)
+            self.assertNotIn("shot noise of the dark charge included", said)
+            for key, truth in ("dark_noise_e", 1.83), ("gain_adu_per_e", 0.05):
+                outside[key] += self.outside(channel, {key: truth})
+        self.assertLessEqual(max(outside.values()), 5, outside)
+        channel, said = camera.measured(0.5, [0.5])
+        self.assertIn("is that of 0.5 s, shot noise of the dark charge included", str(channel["notes"]))
+        self.assertEqual(self.outside(channel, {"dark_noise_e": (1.83 ** 2 + 51) ** 0.5}), 0)
+
+    def test_electrons_of_one_code_smooth_nothing(self):
+        keys = "dark_noise_e", "black_level_adu", "dark_current_e_per_s", "gain_adu_per_e"
+        outside = dict.fromkeys(keys, 0)
+        for seed in range(40):
+            camera = Drawn(seed, read_e=0.2 + 0.03 * (seed % 10), dark_e_per_s=20.0, dsnu_e=0.0, gain=(1.0, 0.97, 1.03, 0.8)[seed % 4], full_well=3000.0, black=100 + 0.137 * seed % 1)
+            channel, _ = camera.measured(0.02, self.DARKS_S)
+            for key, truth in zip(keys, (camera.read_e, camera.BLACK, camera.rate.mean(), camera.GAIN)):
+                if channel[key] is None:
+                    continue
+                outside[key] += self.outside(channel, {key: truth})
+                self.assertGreater(channel[key]["high"], channel[key]["low"], key)
+        self.assertLessEqual(max(outside.values()), 7, outside)
+
+    def test_copies_under_other_conditions_are_refused(self):
+        for seed, read_e in (0, 6.0), (1, 1.0):
+            camera = Drawn(seed, read_e=read_e)
+            frames = camera.frames(0.02, self.DARKS_S)
+            for kind in "dark", "flat":
+                own = [place for place, frame in enumerate(frames) if frame[0] == kind]
+                copied = list(frames)
+                for to, of in (own[-2], own[2]), (own[-1], own[3]):
+                    copied[to] = (*frames[to][:3], frames[of][3])
+                channel, said = camera.told(copied)
+                self.assertIsNone(channel)
+                self.assertIn(f"{own[2]}.png and ", said)
+                self.assertIn(f"{own[-2]}.png: their samples are the same", said)
+
+    def test_a_black_level_that_jitters_saw_no_light(self):
+        for seed in range(6):
+            camera = Drawn(seed, read_e=6.0 if seed % 2 else 3.0, dark_e_per_s=10.0, black=8.3, jitter_adu=1.0)
+            channel, said = camera.told(camera.frames(0.02, self.DARKS_S, stack=16), options=())
+            self.assertIsNotNone(channel, said)
+            self.assertNotIn("is the first a dark", said)
+
+    def test_means_of_quiet_rounded_darks_have_no_thousands_of_defects(self):
+        for seed in range(8):
+            camera = Drawn(seed, read_e=0.5 + 0.2 * seed, dark_e_per_s=10.0, dsnu_e=0.4, size=(128, 160))
+            channel, _ = camera.told(camera.frames(0.02, self.DARKS_S, stack=16))
+            for place in "dark", "light":
+                self.assertLessEqual(channel["defects"][place]["count"], 2)
+
+    def test_a_photosite_that_is_clipped_early_takes_no_stack_with_it(self):
+        outside = 0
+        for seed in range(12):
+            camera = Drawn(seed)
+            camera.rate[40, 50] = 450_000.0
+            channel, said = camera.told(camera.frames(0.02, self.DARKS_S, stack=16))
+            self.assertNotIn("too near saturation", str(channel["notes"]))
+            self.assertEqual(channel["defects"]["clipped"], {"count": 1, "sites": [{"x": 50, "y": 40}]})
+            outside += self.outside(channel, {"prnu": Drawn.PRNU, "dark_current_e_per_s": 500.0})
+        self.assertLessEqual(outside, 5)
+
+    def test_full_wells_below_the_end_of_codes_are_none(self):
+        """Darks whose charge is noisy, and a read-out that is not: full photosites are one code, which is no end of codes."""
+        for seed in range(6):
+            camera = Drawn(seed, read_e=0.3, dark_e_per_s=500.0, dsnu_e=0.0, black=100.0)
+            channel, said = camera.told(camera.frames(0.02, self.DARKS_S), options=())
+            self.assertNotIn("it is taken to be", said)
+            self.assertNotIn("the converter ends first", str(channel["undetermined"]))
+
+    def test_light_that_flickers_bends_no_response(self):
+        for seed in range(40):
+            _, said = Drawn(seed, flicker=0.001).measured(0.02, self.DARKS_S)
+            self.assertNotIn("response bends", said)
+
+    def test_photons_of_one_level_that_are_wrong_are_named(self):
+        for seed, share in enumerate(Drawn.SHARES[:10]):
+            wrong = share * Drawn.FULL_WELL
+            _, said = Drawn(seed).measured(0.02, self.DARKS_S, photons=lambda light_e: light_e * (1.1 if light_e == wrong else 1))
+            self.assertIn("of their number of photons: is that wrong?", said)
+            self.assertNotIn("response bends, so", said)
+
+    def test_darks_of_unknown_times_are_no_black_level_that_moves(self):
+        camera = Drawn(1, dark_e_per_s=20.0)
+        _, said = camera.told(camera.frames(0.02, self.DARKS_S), is_timed=False)
+        self.assertIn("they are of several exposure times, which `exposure_s` of a list would tell apart", said)
+
+    def test_sensor_files_part_hot_photosites_from_the_others(self):
+        """Dark currents of 20 e-/s and, of one photosite in a hundred, 2000 more: share and mean come back, within 4/sqrt(n) of the n = 200."""
+        for seed in range(4):
+            camera = Drawn(seed, dark_e_per_s=20.0, hot_share=0.01, hot_e_per_s=2000.0, size=(128, 160))
+            with tempfile.TemporaryDirectory() as folder:
+                file = pathlib.Path(folder) / "sensor.yaml"
+                channel, said = camera.told(camera.frames(0.02, self.DARKS_S), sensor=file)
+                self.assertIsNotNone(channel, said)
+                self.assertGreater(channel["dcnu"]["value"], 2)
+                lines = [line.split(":") for line in file.read_text().splitlines() if line.startswith("  ") and line.count(":") == 1]
+                own = {key.strip(): float(value) for key, value in lines if key.strip() in ("dcnu", "hot_pixel_share", "hot_pixel_dark_current_e_per_s", "dark_current_e_per_s")}
+                light = ["--electrons", "100,100,100", "--size", "16x16", "--exposure", "0.02", "-o", pathlib.Path(folder) / "light.exr"]
+                command = [BINARIES / "render-radiance", "--sensor", file, *light]
+                self.assertEqual(subprocess.run(command, capture_output=True, timeout=60).returncode, 0)
+            self.assertLess(abs(own["hot_pixel_share"] / 0.01 - 1), 0.28)
+            self.assertLess(abs(own["hot_pixel_dark_current_e_per_s"] / 2000 - 1), 0.28)
+            self.assertLess(own["dcnu"], 1)
+            all_e_per_s = own["dark_current_e_per_s"] + own["hot_pixel_share"] * own["hot_pixel_dark_current_e_per_s"]
+            self.assertLess(abs(all_e_per_s / channel["dark_current_e_per_s"]["value"] - 1), 1e-3)
 
 
 def squares(images, tables):

@@ -6,6 +6,8 @@
 pub mod bounds;
 pub mod dng;
 pub mod makers;
+pub mod misses;
+pub mod photon_transfer;
 pub mod workshop;
 
 use cyanometer::camera::optics::Exposure;

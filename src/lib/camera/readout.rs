@@ -13,7 +13,7 @@ const MOST_PITCH_UM: f64 = 300.0;
 /// The lowest temperature in K that does not look like °C: charge freezes out below.
 const LEAST_TEMPERATURE_K: f64 = 70.0;
 /// The largest non-uniformity of dark current that does not look like per cent.
-const MOST_DCNU: f64 = 2.0;
+pub const MOST_DCNU: f64 = 2.0;
 /// The same of the response.
 const MOST_PRNU: f64 = 0.5;
 /// The same of whole rows and columns: gains of amplifiers differ by less.

@@ -96,10 +96,12 @@ impl Interval {
         Self { value: f(self.value), low: f(self.low), high: f(self.high) }
     }
 
-    /// The interval of the root of a variance, none of it below 0.
+    /// The interval of the root of a variance, none of it below 0: of an estimate below 0 that of 0, which reaches as far up, as a variance
+    /// that chance has below 0 is not known to be none.
     #[must_use]
     pub fn root(self) -> Self {
-        self.map(|variance| variance.max(0.0).sqrt())
+        let above = if self.value < 0.0 { Self { high: self.high - self.value, ..self } } else { self };
+        above.map(|variance| variance.max(0.0).sqrt())
     }
 }
 
@@ -141,6 +143,15 @@ mod tests {
         assert!((found.freedom - 25.0).abs() < 1e-12);
         let short = MeanSquare { value: 1.0, freedom: 100.0 }.with_tails(-1.2, 100.0);
         assert_eq!(short.freedom, 100.0);
+    }
+
+    /// A variance of −3 to −1 about −2 is one of 0 to 1: chance has it below 0, and does not make it none.
+    #[test]
+    fn roots_of_variances_below_none_are_no_points() {
+        let below = Interval { value: -2.0, low: -3.0, high: -1.0 };
+        assert_eq!(below.root(), Interval { value: 0.0, low: 0.0, high: 1.0 });
+        let above = Interval { value: 4.0, low: -1.0, high: 9.0 };
+        assert_eq!(above.root(), Interval { value: 2.0, low: 0.0, high: 3.0 });
     }
 
     /// The interval of a single mean square is that of χ²: of 10 degrees of freedom, 10/20.4831 to 10/3.24697 times it.

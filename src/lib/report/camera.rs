@@ -158,7 +158,9 @@ fn channel(class: &ClassFindings, [light, dark]: &[Option<PatternView>; 2]) -> V
     let named = &class.stuck[..class.stuck.len().min(NAMED)];
     let stuck = json!({"count": class.stuck.len(), "sites": named});
     let [light, dark] = [light, dark].map(|view| view.as_ref().map(defects));
-    all.insert("defects".into(), json!({"light": light, "dark": dark, "stuck": stuck}));
+    let places: Vec<Value> = class.early.iter().take(NAMED).map(|[x, y]| json!({"x": x, "y": y})).collect();
+    let early = json!({"count": class.early.len(), "sites": places});
+    all.insert("defects".into(), json!({"light": light, "dark": dark, "stuck": stuck, "clipped": early}));
     all.insert("notes".into(), json!(class.notes));
     all.into()
 }

@@ -1,7 +1,7 @@
 //! A measured camera as a sensor file, with what each number is from.
 
-use crate::analysis::photon_transfer::ClassFindings;
-use crate::camera::readout::ReadOut;
+use crate::analysis::photon_transfer::{ClassFindings, HotTail};
+use crate::camera::readout::{MOST_DCNU, ReadOut};
 use crate::camera::sensor::{Origin, Provenance, SENSOR_SCHEMA, Sensor};
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
@@ -12,6 +12,9 @@ use std::collections::BTreeMap;
 
 /// The temperature that is assumed where none is known, K.
 const ROOM_K: f64 = 295.0;
+
+/// Fewer photosites that stand out may be chance.
+const LEAST_HOT: usize = 3;
 
 /// Numbers of the file with their origins.
 #[derive(Default)]
@@ -86,8 +89,11 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     let column_noise_e = taken("column_noise_e", "column_noise_e");
     let prnu = taken("prnu", "prnu_pixel");
     let dark_current = taken("dark_current_e_per_s", "dark_current_e_per_s");
-    let dcnu = if dark_current > 0.0 { taken("dcnu", "dcnu") } else { 0.0 };
-    let dsnu_e = if dcnu > 0.0 { taken("dsnu_e", "dsnu_offset_e") } else { taken("dsnu_e", "dsnu_pixel_e") };
+    let all_dcnu = if dark_current > 0.0 { taken("dcnu", "dcnu") } else { 0.0 };
+    let dsnu_e = if all_dcnu > 0.0 { taken("dsnu_e", "dsnu_offset_e") } else { taken("dsnu_e", "dsnu_pixel_e") };
+    let dark = [dark_current, all_dcnu, dsnu_e * gain.value];
+    let Dark { dark_current_e_per_s, dcnu, hot_pixel_share, hot_pixel_dark_current_e_per_s } =
+        dark_of(camera, gain.value, dark, &mut told);
     let lines = [("prnu_column", 0, 0), ("prnu_row", 0, 1), ("dsnu_column_e", 1, 0), ("dsnu_row_e", 1, 1)];
     let [prnu_column, prnu_row, dsnu_column_e, dsnu_row_e] = lines.map(|(key, stack, axis)| {
         let found = lines_of(camera, stack, axis) / if stack == 1 { gain.value } else { 1.0 };
@@ -128,7 +134,7 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         }),
         full_well_e,
         dark_current_na_per_cm2: None,
-        dark_current_e_per_s: Some(dark_current),
+        dark_current_e_per_s: Some(dark_current_e_per_s),
         temperature_k: camera.temperature_k.unwrap_or(ROOM_K),
         dcnu,
         prnu,
@@ -142,8 +148,8 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         dsnu_column_e,
         prnu_row,
         prnu_column,
-        hot_pixel_share: 0.0,
-        hot_pixel_dark_current_e_per_s: 0.0,
+        hot_pixel_share,
+        hot_pixel_dark_current_e_per_s,
         rts_share: 0.0,
         rts_amplitude_e: 0.0,
         smear_line_s: 0.0,
@@ -168,6 +174,49 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     };
     sensor.check().map_err(|problem| lacking(&problem))?;
     Ok(sensor)
+}
+
+/// The dark current of a sensor file, with that of hot photosites apart.
+struct Dark {
+    dark_current_e_per_s: f64,
+    dcnu: f64,
+    hot_pixel_share: f64,
+    hot_pixel_dark_current_e_per_s: f64,
+}
+
+/// Hot photosites apart from all others, of a mean dark current in e⁻/s and its non-uniformity as they are measured of all, and a pattern
+/// that no time adds, in codes: a normal law of all would have negative dark currents where hot ones are in it.
+fn dark_of(camera: &MeasuredCamera, gain: f64, [current, all_dcnu, offset]: [f64; 3], told: &mut Told) -> Dark {
+    let classes = camera.classes.len() as f64;
+    let hot: Vec<HotTail> = camera.classes.iter().filter_map(|class| class.hot).collect();
+    let share = hot.iter().map(|tail| tail.share).sum::<f64>() / classes;
+    let mean = hot.iter().map(|tail| tail.share * tail.excess_per_s).sum::<f64>() / classes / gain;
+    let count: usize = hot.iter().map(|tail| tail.count).sum();
+    let are_few = count == 0 || count < LEAST_HOT && all_dcnu <= MOST_DCNU;
+    if all_dcnu <= 0.0 || are_few {
+        if all_dcnu > MOST_DCNU {
+            let why = format!("more than a normal law may have; {all_dcnu:.3} was measured");
+            told.tell("dcnu", Origin::Assumed, why);
+        }
+        let dcnu = all_dcnu.min(MOST_DCNU);
+        return Dark { dark_current_e_per_s: current, dcnu, hot_pixel_share: 0.0, hot_pixel_dark_current_e_per_s: 0.0 };
+    }
+    // What chance has above all of the dark current is no more than that.
+    let (of_one, mean) = (mean / share, mean.min(current));
+    let others = current - mean;
+    // Per second, as a share of the current of others.
+    let spread = |tail: &HotTail| (tail.others - offset * offset).max(0.0) / (tail.exposure_s * gain * others).powi(2);
+    let square = if others > 0.0 { hot.iter().map(spread).sum::<f64>() / hot.len() as f64 } else { 0.0 };
+    let dcnu = square.sqrt().min(MOST_DCNU);
+    let by =
+        format!("{count} photosites that stand out of the darks of {} s, by an exponential law", hot[0].exposure_s);
+    told.tell("hot_pixel_share", Origin::Derived, by.clone());
+    told.tell("hot_pixel_dark_current_e_per_s", Origin::Derived, by);
+    let of_all = format!("without hot photosites, of which it was {}", crate::text::in_digits(current, 4));
+    told.tell("dark_current_e_per_s", Origin::Derived, of_all);
+    let of_all = format!("that of most photosites; with hot ones it was {}", crate::text::in_digits(all_dcnu, 4));
+    told.tell("dcnu", Origin::Derived, of_all);
+    Dark { dark_current_e_per_s: others, dcnu, hot_pixel_share: mean / of_one, hot_pixel_dark_current_e_per_s: of_one }
 }
 
 /// Spread between columns, or rows, of the pattern under light or in the dark behind the high-pass filter; 0 where it is not told

@@ -1,7 +1,9 @@
 //! What may make the numbers of a camera wrong, as its levels show it.
 
-use super::curve::{Curve, below_saturation};
+use super::curve::{Bend, Curve, below_saturation};
 use super::level::Level;
+use super::suspects::Suspect;
+use crate::numerics::quantiles::of_student;
 
 /// So many standard deviations are beyond chance.
 const BEYOND: f64 = 5.0;
@@ -13,7 +15,9 @@ const MISSED: f64 = 0.02;
 const DRIFT: f64 = 1e-3;
 
 /// What a user should be warned of.
-pub fn doubts(curve: &Curve, flats: &[Level], confidence: f64) -> Vec<String> {
+pub fn doubts(curve: &Curve, flats: &[Level], suspects: &[Suspect], confidence: f64) -> Vec<String> {
+    // Of a level that is named the response seems to bend.
+    let is_named = flats.iter().any(|flat| suspects.iter().any(|suspect| suspect.place == flat.place));
     let other_time = curve.other_time().map(|([least, most], flat)| {
         let darks = if least < most { format!("the line through darks of {least} to {most} s") } else { format!("darks of {least} s") };
         format!(
@@ -37,7 +41,7 @@ pub fn doubts(curve: &Curve, flats: &[Level], confidence: f64) -> Vec<String> {
         exchanged(curve, flats),
         missed(curve),
         drifting(curve, flats),
-        bent(curve, confidence),
+        bent(curve, confidence).filter(|_| !is_named),
     ];
     all.into_iter().flatten().collect()
 }
@@ -118,11 +122,13 @@ fn drifting(curve: &Curve, flats: &[Level]) -> Option<String> {
 
 /// A response that bends, which the variances follow and their scatter hides.
 fn bent(curve: &Curve, confidence: f64) -> Option<String> {
-    let [missed, scatter] = curve.bend()?;
+    /// What is as sure is beyond chance.
+    const SURE: f64 = 0.999;
+    let Bend { missed, scatter, freedom } = curve.bend()?;
     let gain = curve.interval(|values| Some(values.gain), confidence)?;
     let width = (gain.high - gain.low) / (2.0 * gain.value);
-    // Twice what it scatters by, and more than half of what the interval has room for.
-    let is_told = missed.abs() > 2.0 * scatter && missed.abs() > width / 2.0;
+    // Beyond what light that flickers from level to level makes of it, and more than half of what the interval has room for.
+    let is_told = missed.abs() > of_student(SURE, freedom) * scatter && missed.abs() > width / 2.0;
     is_told.then(|| {
         format!(
             "the response bends, so that the gain, the slope of the whole photon transfer curve, is about {:.1} % {} than that of \

@@ -7,7 +7,8 @@ use super::level::Level;
 use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal, with_hidden};
-use super::reasons::{Reasons, UNSATURATED, of_gain};
+use super::reasons::{NO_NOISE, Reasons, UNSATURATED, of_gain, time_of_noise};
+use super::rounding::{Steps, least_normal};
 use super::scatter::Scatter;
 use super::settings::Settings;
 use super::sheet::{ClassFindings, CurvePoint, DarkPoint, Found, finding, over};
@@ -33,8 +34,16 @@ pub fn of_class(
     let (flats, darks, all_darks) = (&flats[..], &darks[..], &all_darks[..]);
     let below: Vec<&Level> = below_saturation(flats).into_iter().map(|flat| &flats[flat]).collect();
     let scatter = Scatter::of(&below, all_darks);
+    let curve_of = |levels: [&[Level]; 2]| {
+        Curve::of(levels[0], levels[1], &scatter, settings).filter(|curve| curve.values().is_some())
+    };
+    // By the gain is known how coarse shot noise is.
+    let first = curve_of([flats, darks]);
+    let stepped = first.as_ref().and_then(|first| with_steps(first, [flats, darks, all_darks], rounding));
+    let curve = stepped.as_ref().map_or(first, |[flats, darks, _]| curve_of([flats, darks]));
+    let (flats, darks, all_darks) =
+        stepped.as_ref().map_or((flats, darks, all_darks), |[flats, darks, all]| (&flats[..], &darks[..], &all[..]));
     let nothing = |why: String| without_gain(name, why, [given, darks, all_darks], &scatter, settings);
-    let curve = Curve::of(flats, darks, &scatter, settings).filter(|curve| curve.values().is_some());
     let Some(curve) = curve else { return nothing(of_gain(flats, darks, rounding)) };
     if let Some(gain) = curve.interval(|values| Some(values.gain), confidence).filter(|gain| gain.low <= 0.0) {
         return nothing(format!(
@@ -53,16 +62,22 @@ pub fn of_class(
     add("gain_adu_per_e", gain.clone());
     let responsivity = number(&|v| v.responsivity, no_photons());
     add("responsivity_adu_per_photon", responsivity.clone());
-    add("quantum_efficiency", number(&|v| Some(v.responsivity? / v.gain), no_photons()));
+    let efficiency = number(&|v| Some(v.responsivity? / v.gain), no_photons());
+    add("quantum_efficiency", efficiency.clone());
     add("black_level_adu", number(&|v| v.dark_mean, no_darks()));
-    add("dark_noise_adu", number(&|v| v.dark_variance, no_darks()).map(Interval::root));
+    // Beneath the rounding, and where the line through the flats ends below none, nothing is left to tell.
+    let variance_of = |of: &dyn Fn(&Values) -> Option<f64>| {
+        number(of, reasons.of_noise())
+            .and_then(|found| if found.high > 0.0 { Ok(found) } else { Err(reasons.of_noise()) })
+    };
+    add("dark_noise_adu", variance_of(&|v| v.dark_variance).map(Interval::root));
     let read_variance = |v: &Values| Some((v.dark_variance? - rounding) / (v.gain * v.gain));
-    // Beneath the rounding nothing is left to tell.
-    let read = number(&read_variance, no_darks());
-    let read = read.and_then(|read| if read.high > 0.0 { Ok(read) } else { Err(reasons.of_noise()) });
-    add("dark_noise_e", read.map(Interval::root));
+    add("dark_noise_e", variance_of(&read_variance).map(Interval::root));
     let repeated: Vec<&Level> = darks.iter().filter(|dark| dark.frames >= 2).collect();
-    let over_gain = |part: Found| -> Found { Ok(over(part?.root(), gain.clone()?)) };
+    let over_gain = |part: Found| -> Found {
+        let root = part?.root();
+        if root.high > 0.0 { Ok(over(root, gain.clone()?)) } else { Err(NO_NOISE.into()) }
+    };
     let quietest = repeated.iter().min_by(|a, b| a.variance.total_cmp(&b.variance));
     for (key, part) in [("row_noise_e", Part::Row), ("column_noise_e", Part::Column), ("pixel_noise_e", Part::Pixel)] {
         let of_part = |quietest: &&Level| match part {
@@ -75,9 +90,8 @@ pub fn of_class(
     // The signal that equals its noise: ½ + √(¼ + σ²) [EMVA1288, Eq. 25].
     let noise_square = |v: &Values| Some(v.dark_variance? / (v.gain * v.gain));
     let threshold = |square: f64| 0.5 + (0.25 + square.max(0.0)).sqrt();
-    let threshold_e = number(&noise_square, no_darks()).map(|square| square.map(threshold));
+    let threshold_e = variance_of(&noise_square).map(|square| square.map(threshold));
     add("threshold_e", threshold_e.clone());
-    let efficiency = number(&|v| Some(v.responsivity? / v.gain), no_photons());
     add("threshold_photons", threshold_e.clone().and_then(|threshold| Ok(over(threshold, efficiency?))));
     let limit = Limit::of(&curve, flats, settings);
     let [saturation_e, saturation_photons, full_well] = limit.capacities(reasons, gain.clone());
@@ -136,7 +150,8 @@ pub fn of_class(
     }
     let (curve_points, values) = (points.collect(), curve.values());
     let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames), &limit);
-    let mut doubts = doubts(&curve, flats, confidence);
+    let suspects = suspects(Some(&curve), flats, all_darks, &scatter);
+    let mut doubts = doubts(&curve, flats, &suspects, confidence);
     if let [Some((_, lit)), Some((_, dark))] = stacks
         && !is_same_time(lit, dark)
         && let Some((flat_s, dark_s)) = lit.condition.exposure_s.zip(dark.condition.exposure_s)
@@ -160,9 +175,45 @@ pub fn of_class(
         stacks: places,
         notes,
         doubts,
-        suspects: suspects(Some(&curve), flats, all_darks, &scatter),
+        suspects,
         stuck: Vec::new(),
+        early: Vec::new(),
+        hot: None,
     }
+}
+
+/// Flats, darks and all darks with the steps that smooth their codes, where these leave more of the error of rounding than normal noise
+/// of their variance would; none where none do.
+fn with_steps(curve: &Curve, levels: [&[Level]; 3], rounding: f64) -> Option<[Vec<Level>; 3]> {
+    /// Codes that are worth a second look.
+    const LEAST: f64 = 1e-4;
+    /// What is less likely is not reckoned with.
+    const SURE: f64 = 0.98;
+    let (gain, darks) = (curve.values()?.gain, levels[1]);
+    let time = |dark: &&Level| dark.condition.exposure_s.unwrap_or(0.0);
+    let quietest = darks.iter().min_by(|a, b| time(a).total_cmp(&time(b)).then(a.variance.total_cmp(&b.variance)))?;
+    let black = curve.values()?.black.unwrap_or(quietest.mean);
+    let of_charge = gain * (quietest.mean - black).max(0.0);
+    let of_quietest = least_normal(quietest.variance, quietest.variance_variance) - of_charge;
+    // That of no time, where darks tell it.
+    let at_none = curve.interval(|values| values.dark_variance, SURE).filter(|_| curve.time_of_noise().is_none());
+    let of_none = at_none.map_or(0.0, |at_none| least_normal(at_none.low, 0.0));
+    let normal = of_quietest.max(of_none).max(0.0);
+    if rounding <= 0.0 || gain.is_nan() || gain <= 0.0 {
+        return None;
+    }
+    let mut is_any = false;
+    let stepped = levels.map(|levels| {
+        let of = |level: &Level| {
+            let electrons = ((level.mean - black) / gain).max(0.0);
+            let own = Level { steps: Some(Steps { normal, electrons, gain }), ..level.clone() };
+            let is_coarse = own.hidden(rounding).mean > level.hidden(rounding).mean + LEAST;
+            is_any |= is_coarse;
+            if is_coarse { own } else { level.clone() }
+        };
+        levels.iter().map(of).collect::<Vec<Level>>()
+    });
+    is_any.then_some(stepped)
 }
 
 /// An interval of which the number has another error besides, a variance.
@@ -239,7 +290,8 @@ fn add_patterns(
         let result = match (flat, dark) {
             (Some((index, flat)), Some((_, dark))) if curve.knows_black(index) => {
                 let signal = curve.signal(index);
-                Ok(of_light(flat, dark, part, confidence).root().map(|spread| spread / signal))
+                let spread = of_light(flat, dark, part, confidence).root();
+                if spread.high > 0.0 { Ok(spread.map(|spread| spread / signal)) } else { Err(NO_NOISE.into()) }
             }
             (None, _) => Err("it takes two flats or more below saturation".into()),
             _ => Err(reasons.of_darks()),
@@ -274,10 +326,13 @@ fn notes(curve: &Curve, flats: &[Level], frames: Option<usize>, limit: &Limit) -
         ));
     }
     if curve.is_offset_free {
-        notes.push(
-            "the variance of no light is that which the line through the flats has at no signal, as darks do not tell it".into(),
-        );
+        let end = if curve.times() >= 2 && !curve.are_darks_clipped { "no light and no time" } else { "no signal" };
+        let of_gain = if curve.is_noise_of_line() { "" } else { " as far as the gain goes" };
+        notes.push(format!(
+            "the variance of no light is that which the line through the flats has at {end}{of_gain}, as darks do not tell it"
+        ));
     }
+    notes.extend(curve.values().and_then(|values| values.dark_variance).and(curve.time_of_noise()).map(time_of_noise));
     let lit = flats.iter().filter(|flat| flat.condition.photons.is_none()).count();
     if lit > 0 && flats.iter().any(|flat| flat.condition.photons.is_some()) {
         notes.push(format!("{lit} flats have no number of photons, and do not count for the responsivity"));

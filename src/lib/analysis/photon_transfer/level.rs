@@ -1,6 +1,6 @@
 //! What a class of photosites does at one level of light, or in the dark.
 
-use super::rounding::Hidden;
+use super::rounding::{Hidden, Steps};
 use super::tally::SiteSurvey;
 
 /// A level of light, or darkness, as frames of it were taken.
@@ -37,6 +37,8 @@ pub struct Level {
     pub at_ends: [f64; 2],
     /// The share of the photosites whose means are those of full ones, where that is counted.
     pub full: f64,
+    /// What smooths its codes as it is drawn, where that is known to be coarser than normal noise of its variance.
+    pub steps: Option<Steps>,
     /// The grids of the class.
     pub sites: Vec<SiteSurvey>,
 }
@@ -60,6 +62,7 @@ impl Level {
             variance_variance: scatter(&|site| site.variance_variance),
             at_ends: [at_end(0), at_end(1)],
             full: mean(&|site| site.full as f64 / site.count() as f64),
+            steps: None,
             sites,
         }
     }
@@ -71,7 +74,14 @@ impl Level {
 
     /// How far its mean and its variance may be off as rounding hides noise; samples that are not rounded hide none.
     pub fn hidden(&self, rounding: f64) -> Hidden {
-        if rounding > 0.0 { Hidden::behind(self.variance, self.variance_variance) } else { Hidden::default() }
+        if rounding > 0.0 { self.hidden_beneath(0.0) } else { Hidden::default() }
+    }
+
+    /// The same of samples that a pattern of such a variance spreads besides.
+    pub fn hidden_beneath(&self, pattern: f64) -> Hidden {
+        let of_variance = Hidden::behind(self.variance + pattern, self.variance_variance);
+        let of_steps = self.steps.map(|steps| Hidden::of(Steps { normal: steps.normal + pattern, ..steps }));
+        of_steps.map_or(of_variance, |hidden| of_variance.or(hidden))
     }
 
     /// Independent values that its variance is an average of.

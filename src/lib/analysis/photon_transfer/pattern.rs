@@ -76,7 +76,7 @@ pub fn hidden_pattern(level: &Level, rounding: f64) -> Hidden {
         return Hidden::default();
     }
     let pattern = fixed(level, Part::Total, ANY).value.max(0.0);
-    let [own, all] = [0.0, pattern].map(|pattern| Hidden::behind(level.variance + pattern, level.variance_variance));
+    let [own, all] = [0.0, pattern].map(|pattern| level.hidden_beneath(pattern));
     Hidden { variance: own.variance + all.variance, ..all }
 }
 

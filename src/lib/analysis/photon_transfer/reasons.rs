@@ -13,6 +13,18 @@ pub const CUT_OFF: &str = "hot photosites are full, or reach the largest code, i
 pub const UNSATURATED: &str =
     "the variance still rises at the brightest flat: brighter ones, until it falls, would tell";
 
+/// Of what frames without any noise do not tell.
+pub const NO_NOISE: &str = "the frames show none at all, not even noise: it takes frames as a camera gives them";
+
+/// What is said of dark noise that is not that of no exposure time but of such a one.
+pub fn time_of_noise(time_s: Option<f64>) -> String {
+    let of = time_s.map_or("the exposure time of the darks, which is not known".to_owned(), |time| format!("{time} s"));
+    format!(
+        "temporal dark noise, and the threshold with it, is that of {of}, shot noise of the dark charge included: darks at three exposure \
+         times or more would tell that of no time"
+    )
+}
+
 /// The levels that reasons are told of.
 #[derive(Clone, Copy)]
 pub struct Reasons<'a> {

@@ -7,7 +7,10 @@
 //!
 //! k from 1 on, as the error of rounding is a sawtooth of the sample. Where between two codes m lies differs from photosite to
 //! photosite and is not known: what both sums may be at most is an error that does not average out, and no more frames take it away.
-//! Noise is taken to be normal: shot noise of few electrons, each of half a code or more, has steps that smooth less.
+//!
+//! Shot noise is that of whole electrons: of a Poisson law of n electrons, K codes each, beside normal noise of variance u the waves
+//! are e^(−2π²k²u − n (1 − cos 2πkK)), and in place of 4u stands 4 (u + n K |sin πkK|/πk) at most. Of electrons of one code each shot
+//! noise smooths nothing at all.
 
 use crate::numerics::quantiles::of_normal;
 use std::f64::consts::PI;
@@ -20,8 +23,21 @@ const SMOOTH: f64 = 2.0;
 const RESOLVED: f64 = 1e-4;
 /// Variances of noise that reaches no second edge from half way between two codes, 5 standard deviations off, in codes².
 const ALIKE: f64 = 1e-2;
+/// The variance that was measured may be more than that of the samples, so likely.
+const SURE: f64 = 0.99;
 /// The error of rounding, in codes².
 const EVEN: f64 = 1.0 / 12.0;
+
+/// Noise that smooths codes, as it is drawn: normal, and that of whole electrons.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steps {
+    /// The variance of normal noise, no more than there is, in codes².
+    pub normal: f64,
+    /// Electrons whose shot noise stands beside it.
+    pub electrons: f64,
+    /// Codes of an electron.
+    pub gain: f64,
+}
 
 /// How far what rounded samples tell may be off, at most.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -37,8 +53,6 @@ pub struct Hidden {
 impl Hidden {
     /// By the variance of samples and what that scatters by, a variance.
     pub fn behind(variance: f64, scatter: f64) -> Self {
-        /// The variance that was measured may be more than that of the samples, so likely.
-        const SURE: f64 = 0.99;
         let low = variance - of_normal(SURE) * scatter.max(0.0).sqrt();
         if low > SMOOTH + EVEN {
             return Self::default();
@@ -55,6 +69,35 @@ impl Hidden {
             step: sum(|_| 2.0),
         }
     }
+}
+
+impl Hidden {
+    /// The same of noise as it is drawn.
+    pub fn of(Steps { normal, electrons, gain }: Steps) -> Self {
+        if normal > SMOOTH {
+            return Self::default();
+        }
+        let term = |k: u32| {
+            let (phase, k) = (PI * f64::from(k) * gain, f64::from(k));
+            let left = (-2.0 * (PI * k).powi(2) * normal - 2.0 * electrons * phase.sin().powi(2)).exp();
+            let slope = normal + electrons * gain * phase.sin().abs() / (PI * k);
+            [left / (PI * k), left * ((PI * k).powi(-2) + 4.0 * slope), 2.0 * left]
+        };
+        let sum = |which: usize| (1..=TERMS).map(|k| term(k)[which]).sum::<f64>();
+        Self { mean: sum(0).min(0.5), variance: sum(1), step: sum(2) }
+    }
+
+    /// The larger of both, each by itself.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        let Self { mean, variance, step } = self;
+        Self { mean: mean.max(other.mean), variance: variance.max(other.variance), step: step.max(other.step) }
+    }
+}
+
+/// The variance in codes² that normal noise has at least, by that of rounded samples; none that is sure of such a one.
+pub fn least_normal(variance: f64, scatter: f64) -> f64 {
+    before(variance - of_normal(SURE) * scatter.max(0.0).sqrt(), -1.0)
 }
 
 /// e^(−2π²k²u).
@@ -117,5 +160,46 @@ mod tests {
             assert!(std < 0.45 || worst.iter().all(|share| *share > 0.5), "{std}: {worst:?}");
         }
         assert_eq!(Hidden::behind(9.0, 1e-4), Hidden::default());
+    }
+
+    /// Of 0 to 40 electrons of 0.4 to 1.5 codes each and of normal noise, rounded, neither mean nor variance is off by more; of one code
+    /// each by as much as without any.
+    #[test]
+    fn electrons_smooth_no_more_than_their_steps_do() {
+        let poisson = |n: f64| {
+            let mut terms = vec![(-n).exp()];
+            (1..120).for_each(|count: u32| terms.push(terms[count as usize - 1] * n / f64::from(count)));
+            terms
+        };
+        for (n, gain, std) in [
+            (0.0, 1.0, 0.3),
+            (5.0, 1.0, 0.3),
+            (40.0, 1.0, 0.4),
+            (40.0, 1.01, 0.3),
+            (3.0, 0.4, 0.2),
+            (10.0, 0.5, 0.1),
+            (8.0, 0.7, 0.2),
+            (20.0, 1.5, 0.25),
+        ] {
+            let hidden = Hidden::of(Steps { normal: std * std, electrons: n, gain });
+            for place in 0..50 {
+                let offset = f64::from(place) / 50.0;
+                let (mut first, mut second, mut all) = (0.0, 0.0, 0.0);
+                for (count, share) in (0..).map(f64::from).zip(poisson(n)) {
+                    let at = offset + gain * count;
+                    let [mean, variance] = rounded(at - at.floor(), std);
+                    let mean = at.floor() + mean;
+                    (first, second, all) =
+                        (first + share * mean, second + share * (variance + mean * mean), all + share);
+                }
+                assert!((all - 1.0).abs() < 1e-9);
+                let truth = [offset + gain * n, std * std + gain * gain * n + EVEN];
+                let off = [(first - truth[0]).abs(), (second - first * first - truth[1]).abs()];
+                assert!(off[0] <= hidden.mean + 1e-6, "{n} {gain} {std} {offset}: {off:?} {hidden:?}");
+                assert!(off[1] <= hidden.variance + 1e-6, "{n} {gain} {std} {offset}: {off:?} {hidden:?}");
+            }
+        }
+        let [one, none] = [5.0, 0.0].map(|electrons| Hidden::of(Steps { normal: 0.09, electrons, gain: 1.0 }));
+        assert!((one.mean - none.mean).abs() < 1e-12 && Hidden::behind(5.0, 0.0) == Hidden::default());
     }
 }

@@ -124,7 +124,8 @@ impl Scatter {
             Component { variance: found[which], freedom }
         };
         let [black, light] = [0, 1].map(component);
-        Self { black, light, told: told(&means, found) }
+        let are_timed = darks.iter().all(|dark| dark.condition.exposure_s.is_some());
+        Self { black, light, told: told(&means, found, are_timed) }
     }
 
     /// What the mean of a level is uncertain by from its black, a variance.
@@ -173,8 +174,8 @@ fn components(means: &[Means]) -> [f64; 2] {
     found
 }
 
-/// What is said of scatter that noise does not explain.
-fn told(means: &[Means], [black, light]: [f64; 2]) -> Vec<(String, bool)> {
+/// What is said of scatter that noise does not explain, of darks whose exposure times are known or not.
+fn told(means: &[Means], [black, light]: [f64; 2], are_timed: bool) -> Vec<(String, bool)> {
     /// Light that scatters by so large a share is doubted.
     const MUCH: f64 = 1e-3;
     /// A black level that scatters by so much is.
@@ -193,10 +194,15 @@ fn told(means: &[Means], [black, light]: [f64; 2]) -> Vec<(String, bool)> {
     };
     let of_black = beyond(false, [0.0; 2]).filter(|_| black > 0.0).map(|noise| {
         let text = format!(
-            "means of darks scatter by {} ADU from frame to frame, of which noise explains {}: the black level moves, which \
-             intervals of black level, dark current and linearity take in",
+            "means of darks scatter by {} ADU from frame to frame, of which noise explains {}: {}, which intervals of black level, dark \
+             current and linearity take in",
             in_digits(black.sqrt().hypot(noise), 3),
-            in_digits(noise, 3)
+            in_digits(noise, 3),
+            if are_timed {
+                "the black level moves"
+            } else {
+                "they are of several exposure times, which `exposure_s` of a list would tell apart, or the black level moves"
+            }
         );
         (text, black.sqrt() >= MUCH_ADU)
     });

@@ -1,6 +1,7 @@
 //! The data sheet of a camera: its numbers, each with its interval or with what would tell it, and the curves.
 
 use super::curve::Values;
+use super::hot::HotTail;
 use super::level::Level;
 use super::linearity::Linearity;
 use super::stuck::StuckSite;
@@ -101,6 +102,10 @@ pub struct ClassFindings {
     pub suspects: Vec<Suspect>,
     /// Photosites that hold one value, and were left out.
     pub stuck: Vec<StuckSite>,
+    /// Columns and rows of photosites that are full, or reach the largest code, under light far below that, and were left out.
+    pub early: Vec<[usize; 2]>,
+    /// Hot photosites apart from all others, where there are some.
+    pub hot: Option<HotTail>,
 }
 
 impl ClassFindings {

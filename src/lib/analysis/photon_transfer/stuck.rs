@@ -1,5 +1,7 @@
 //! Photosites that hold one value with light and without: they measure nothing, and a few of them are as much as a pattern.
 //!
+//! So do those that reach the largest code under light that is far from it for all others, hot ones above all: they do not follow it.
+//!
 //! Of n photosites one that is stuck at c adds (c − μ)²/n to the variance between photosites: less under light than in the dark, so
 //! that what light adds, the difference of the two, is too small, or none at all.
 
@@ -48,6 +50,8 @@ pub struct Stuck {
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Grid {
     sites: Vec<(StandIn, StuckSite)>,
+    /// Those that reach the largest code early, and their places in the frame.
+    early: Vec<(StandIn, [usize; 2])>,
     class: String,
     count: usize,
 }
@@ -65,35 +69,87 @@ impl Stuck {
     pub fn of(sites: &[Site], size: [usize; 2], [dark, flat]: [&Picture; 2], are_codes: bool) -> Self {
         let grid = |(index, site): (usize, &Site)| {
             let sites = stuck_of(site, size, [dark, flat], index, are_codes);
-            Grid { sites, class: site.class.clone(), count: site.count() }
+            Grid { sites, early: Vec::new(), class: site.class.clone(), count: site.count() }
+        };
+        Self { grids: sites.iter().enumerate().map(grid).collect() }
+    }
+
+    /// The same with those besides that reach the largest code early: columns and rows of each grid, row by row.
+    #[must_use]
+    pub fn with_early(self, sites: &[Site], early: &[Vec<[usize; 2]>]) -> Self {
+        let grid = |(index, site): (usize, &Site)| {
+            let mut grid = self.grids.get(index).cloned().unwrap_or_default();
+            (grid.class, grid.count) = (site.class.clone(), site.count());
+            let is_known = |[column, row]: &[usize; 2]| {
+                grid.sites.iter().any(|(stuck, _)| stuck.row == *row && stuck.column == *column)
+            };
+            let places: Vec<[usize; 2]> = early[index].iter().filter(|place| !is_known(place)).copied().collect();
+            let mut out: Vec<[usize; 2]> = grid.sites.iter().map(|(stuck, _)| [stuck.column, stuck.row]).collect();
+            out.extend(&places);
+            let with_stand_in = |&[column, row]: &[usize; 2]| {
+                let own: Vec<usize> = out.iter().filter(|place| place[1] == row).map(|place| place[0]).collect();
+                let at = [site.first[0] + column * site.step[0], site.first[1] + row * site.step[1]];
+                Some((StandIn { row, column, by: nearest_other(column, site.size[0], &own)? }, at))
+            };
+            grid.early = places.iter().filter_map(with_stand_in).collect();
+            // One that stood in may be such a one itself.
+            for (stuck, _) in &mut grid.sites {
+                let own: Vec<usize> = out.iter().filter(|place| place[1] == stuck.row).map(|place| place[0]).collect();
+                stuck.by = nearest_other(stuck.column, site.size[0], &own).unwrap_or(stuck.by);
+            }
+            grid
         };
         Self { grids: sites.iter().enumerate().map(grid).collect() }
     }
 
     /// Whether there are any.
     pub fn is_any(&self) -> bool {
-        self.grids.iter().any(|grid| !grid.sites.is_empty())
+        self.grids.iter().any(|grid| !grid.sites.is_empty() || !grid.early.is_empty())
     }
 
-    /// The share of the photosites of a class.
+    /// The share of the photosites of a class that hold one value.
     pub fn share(&self, class: &str) -> f64 {
+        self.share_of(class, |grid| grid.sites.len())
+    }
+
+    fn share_of(&self, class: &str, of: fn(&Grid) -> usize) -> f64 {
         let own = || self.grids.iter().filter(|grid| grid.class == class);
         let count: usize = own().map(|grid| grid.count).sum();
-        own().map(|grid| grid.sites.len()).sum::<usize>() as f64 / count.max(1) as f64
+        own().map(of).sum::<usize>() as f64 / count.max(1) as f64
     }
 
     /// Those of classes that have few, which can be left out.
     #[must_use]
     pub fn few(&self) -> Self {
         let of_few = |grid: &Grid| {
-            if self.share(&grid.class) <= FEW { grid.clone() } else { Grid { sites: Vec::new(), ..grid.clone() } }
+            let mut own = grid.clone();
+            if self.share(&grid.class) > FEW {
+                own.sites.clear();
+            }
+            if self.share_of(&grid.class, |grid| grid.early.len()) > FEW {
+                own.early.clear();
+            }
+            own
         };
         Self { grids: self.grids.iter().map(of_few).collect() }
     }
 
     /// What stands in for those of a grid, in the order of rows.
     pub fn stand_ins(&self, grid: usize) -> Vec<StandIn> {
-        self.grids.get(grid).map_or_else(Vec::new, |grid| grid.sites.iter().map(|(stand_in, _)| *stand_in).collect())
+        let Some(grid) = self.grids.get(grid) else { return Vec::new() };
+        let both =
+            grid.sites.iter().map(|(stand_in, _)| *stand_in).chain(grid.early.iter().map(|(stand_in, _)| *stand_in));
+        let mut all: Vec<StandIn> = both.collect();
+        all.sort_by_key(|stand_in| (stand_in.row, stand_in.column));
+        all
+    }
+
+    /// Columns and rows of the frame's photosites of a class that reach the largest code early, row by row.
+    pub fn early_of_class(&self, class: &str) -> Vec<[usize; 2]> {
+        let own = self.grids.iter().filter(|grid| grid.class == class);
+        let mut found: Vec<[usize; 2]> = own.flat_map(|grid| grid.early.iter().map(|(_, at)| *at)).collect();
+        found.sort_by_key(|[x, y]| (*y, *x));
+        found
     }
 
     /// Those of a class, row by row.
@@ -137,21 +193,20 @@ fn stuck_of(
     for row in 0..rows {
         let of_row = || (0..columns).filter(|&column| is_stuck(means(place(row, column).1)));
         let own: Vec<usize> = of_row().collect();
-        let others = |column: &usize| {
-            let whole = |other: &usize| own.binary_search(other).is_err();
-            (1..columns)
-                .flat_map(|off| [column.checked_sub(off), Some(column + off).filter(|at| *at < columns)])
-                .flatten()
-                .find(whole)
-        };
         for column in &own {
-            let Some(by) = others(column) else { continue };
+            let Some(by) = nearest_other(*column, columns, &own) else { continue };
             let ([x, y], at) = place(row, *column);
             let [dark_adu, light_adu] = means(at);
             found.push((StandIn { row, column: *column, by }, StuckSite { x, y, dark_adu, light_adu }));
         }
     }
     found
+}
+
+/// The column nearest to one, of so many, that is none of those that are `out`.
+fn nearest_other(column: usize, columns: usize, out: &[usize]) -> Option<usize> {
+    let around = (1..columns).flat_map(|off| [column.checked_sub(off), Some(column + off).filter(|at| *at < columns)]);
+    around.flatten().find(|at| !out.contains(at))
 }
 
 /// The median of some thousands of the photosites of a grid.
@@ -187,6 +242,11 @@ mod tests {
         let by: Vec<usize> = found.stand_ins(0).iter().map(|stuck| stuck.by).collect();
         assert_eq!(by, [2, 2, 2]);
         assert!(found.is_any() && !found.few().is_any(), "3 of 48 are more than few");
+        // Those that reach the largest code early, one of which stood in for another, are left out with them.
+        let with = found.clone().with_early(std::slice::from_ref(&site), &[vec![[2, 0], [3, 0], [5, 4]]]);
+        assert_eq!(with.early_of_class("Y"), [[2, 0], [5, 4]]);
+        let by: Vec<[usize; 3]> = with.stand_ins(0).iter().map(|stuck| [stuck.row, stuck.column, stuck.by]).collect();
+        assert_eq!(by, [[0, 2, 1], [0, 3, 4], [1, 0, 2], [1, 1, 2], [4, 5, 4]]);
         // Of light that is not told from noise none is known.
         let dim = Picture { means: dark.means, noise: vec![1.0] };
         assert!(!Stuck::of(&[site], [8, 1], [&dark, &dim], true).is_any());

@@ -11,6 +11,7 @@
 //! correlated: what σ² and m scatter by is told from the scatter of rows and of columns beside that of photosites, clustered both
 //! ways \[CameronEtAl2011].
 
+use super::prints::{Print, Prints};
 use super::sites::Site;
 use super::stuck::Stuck;
 use super::tally::{SiteSurvey, Tally};
@@ -32,6 +33,8 @@ pub struct Survey {
     pub bits: u32,
     /// Means of the sites of each 2x2, row by row, of the first rows of the first frame's first plane.
     pub quad: [f64; 4],
+    /// What tells each frame from all others; none where noise does not.
+    pub prints: Vec<Print>,
 }
 
 /// How frames are surveyed.
@@ -79,6 +82,7 @@ pub fn survey_as<S: RowSource>(frames: &mut [S], asked: &Asked) -> Result<Survey
     let step = frames.iter().map(|frame| geometry.band_rows(frame.natural_rows(), 1)).max().unwrap_or(1).max(1);
     let mut bands: Vec<Vec<f32>> = vec![Vec::new(); frames.len()];
     let (mut done, mut bits, mut quad) = (0, 0, [0.0; 4]);
+    let mut prints = Prints::new(frames.len(), geometry.height);
     while done < geometry.height {
         let rows = step.min(geometry.height - done);
         frames.par_iter_mut().zip(&mut bands).try_for_each(|(frame, band)| {
@@ -90,6 +94,8 @@ pub fn survey_as<S: RowSource>(frames: &mut [S], asked: &Asked) -> Result<Survey
             quad = quad_of(&bands[0], geometry.row_samples(), geometry.width);
         }
         for row in 0..rows {
+            let samples = geometry.row_samples();
+            prints.add(done + row, &bands, row * samples..(row + 1) * samples);
             for (site, tally) in sites.iter().zip(&mut tallies).filter(|(site, _)| site.is_in_row(done + row)) {
                 let plane = |row: usize| (row * planes + site.plane) * geometry.width;
                 tally.add(site, &bands, plane(row)..plane(row) + geometry.width);
@@ -104,7 +110,7 @@ pub fn survey_as<S: RowSource>(frames: &mut [S], asked: &Asked) -> Result<Survey
     if sites.iter().any(|site| !(site.mean.is_finite() && site.variance.is_finite())) {
         return Err(Error::format(&header.name, "it, or one with it, holds samples that are not finite"));
     }
-    Ok(Survey { geometry, sites, picture, bits, quad })
+    Ok(Survey { geometry, sites, picture, bits, quad, prints: prints.finish() })
 }
 
 /// A sample as a code; of what is no whole number all bits.

@@ -1,7 +1,7 @@
 //! Levels that stand far off what all others show: a flat among the darks, a dark among the flats, an exposure time that is wrong.
 
 use super::curve::{Curve, below_saturation};
-use super::fit::{Line, Point};
+use super::fit::{Line, Point, variance_besides};
 use super::level::Level;
 use super::scatter::Scatter;
 use crate::numerics::quantiles::of_student;
@@ -133,8 +133,6 @@ fn off_response(curve: &Curve, flats: &[Level], scatter: &Scatter) -> Vec<Suspec
     const SHARES: [f64; 2] = [0.1, 0.005];
     /// The median of absolute deviations of a normal law, in standard deviations.
     const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
-    /// A signal below such a share of what it should be is none.
-    const NONE: f64 = 0.05;
     let is_by_photons = flats.iter().all(|flat| flat.condition.photons.is_some());
     let light = |flat: &Level| if is_by_photons { flat.condition.photons } else { flat.condition.exposure_s };
     let known: Vec<(usize, f64)> = below_saturation(flats)
@@ -153,18 +151,75 @@ fn off_response(curve: &Curve, flats: &[Level], scatter: &Scatter) -> Vec<Suspec
         let (signal, wanted) = (curve.signal(flat), middle * light);
         let by_chance = (variance(&flats[flat], scatter) + (spread * wanted).powi(2)).sqrt();
         let least = (BEYOND * by_chance).max(SHARES[0] * wanted).max(SHARES[1] * largest);
-        ((signal - wanted).abs() > least).then(|| {
-            let what = if is_by_photons { "number of photons" } else { "exposure time" };
-            let is_it = if signal < NONE * wanted { "are they darks, or is" } else { "is" };
-            let problem = format!(
-                "their signal is {signal:.1} ADU, where the other flats make {wanted:.1} of their {what}: {is_it} that wrong?"
-            );
-            Suspect { place: flats[flat].place, problem }
-        })
+        ((signal - wanted).abs() > least).then(|| unlike(&flats[flat], [signal, wanted], is_by_photons))
     };
-    let found: Vec<Suspect> = known.iter().filter_map(off).collect();
+    let mut found: Vec<Suspect> = known.iter().filter_map(off).collect();
+    if found.is_empty() {
+        found.extend(farthest_off(curve, flats, &known, is_by_photons));
+    }
     // Where many are off, no one is: the response is not straight, or light was not counted so.
     if middle > 0.0 && found.len() * OTHERS < known.len() { found } else { Vec::new() }
+}
+
+/// A flat that has another signal than the others make of its light.
+fn unlike(flat: &Level, [signal, wanted]: [f64; 2], is_by_photons: bool) -> Suspect {
+    /// A signal below such a share of what it should be is none.
+    const NONE: f64 = 0.05;
+    let what = if is_by_photons { "number of photons" } else { "exposure time" };
+    let is_it = if signal < NONE * wanted { "are they darks, or is" } else { "is" };
+    let problem = format!(
+        "their signal is {signal:.1} ADU, where the other flats make {wanted:.1} of their {what}: {is_it} that wrong?"
+    );
+    Suspect { place: flat.place, problem }
+}
+
+/// The flat whose signal over light is farthest off the line of the others over light, which a response that bends evenly follows, where
+/// it is beyond what these miss that line by.
+fn farthest_off(curve: &Curve, flats: &[Level], known: &[(usize, f64)], is_by_photons: bool) -> Option<Suspect> {
+    /// By so large a share, and one of the largest signal, is worth a word.
+    const SHARES: [f64; 2] = [0.03, 0.001];
+    /// What is as sure is beyond chance.
+    const SURE: f64 = 0.99999;
+    /// So many others tell by how much they miss a line.
+    const ENOUGH: usize = 5;
+    if known.len() <= ENOUGH {
+        return None;
+    }
+    let point = |&(flat, light): &(usize, f64)| {
+        let signal = curve.signal(flat);
+        (light, signal / light, curve.signal_variance(flat) / (light * light))
+    };
+    let brightest = known.iter().map(|(flat, _)| curve.signal(*flat)).fold(0.0, f64::max);
+    let off = |place: usize| {
+        let others: Vec<(f64, f64, f64)> =
+            known.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, level)| point(level)).collect();
+        let weighted = |besides: f64| -> Vec<Point> {
+            others
+                .iter()
+                .map(|&(x, y, own)| Point { x, y, weight: 1.0 / (own + besides).max(f64::MIN_POSITIVE) })
+                .collect()
+        };
+        let misfit =
+            |besides: f64| Line::through(weighted(besides)).map_or(0.0, |line| line.chi_square(weighted(besides)));
+        let freedom = others.len() as f64 - 2.0;
+        let largest = others.iter().map(|(_, y, _)| y * y).fold(0.0, f64::max);
+        let besides = variance_besides(freedom, misfit, largest);
+        let points = weighted(besides);
+        let line = Line::through(points.clone())?;
+        let all: f64 = points.iter().map(|point| point.weight).sum();
+        let middle = points.iter().map(|point| point.weight * point.x).sum::<f64>() / all;
+        let spread: f64 = points.iter().map(|point| point.weight * (point.x - middle).powi(2)).sum();
+        let (light, ratio, own) = point(&known[place]);
+        let scatter = (own + besides + 1.0 / all + (light - middle).powi(2) / spread).sqrt();
+        let missed = (ratio - line.at(light)).abs();
+        let least = (SHARES[0] * line.at(light).abs()).max(SHARES[1] * brightest / light);
+        let far = (missed / scatter / of_student(SURE, freedom)).min(missed / least);
+        Some((far, place, line.at(light) * light))
+    };
+    let (_, place, wanted) =
+        (0..known.len()).filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(far, ..)| *far > 1.0)?;
+    let flat = known[place].0;
+    Some(unlike(&flats[flat], [curve.signal(flat), wanted], is_by_photons))
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

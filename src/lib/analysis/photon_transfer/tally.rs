@@ -1,5 +1,6 @@
 //! Sums over a grid of photosites, row by row, and what they tell.
 
+use super::lanes::{depart, dot, sum};
 use super::sites::Site;
 use super::stuck::StandIn;
 use crate::numerics::variance_components::{MeanSquare, MeanSquares, SquareSums};
@@ -23,6 +24,9 @@ pub struct SiteSurvey {
     pub variance_variance: f64,
     /// Samples at or above the top code, and at or below 0.
     pub at_ends: [u64; 2],
+    /// Columns and rows of the grid's photosites that have samples at the top code, or at the largest sample where that is not known, row by
+    /// row; none where they are many.
+    pub at_top: Vec<[usize; 2]>,
     /// Photosites whose means are at or above that of full ones, where that is known.
     pub full: u64,
     /// The largest sample, and how many are it, where no top code is known.
@@ -52,6 +56,7 @@ pub struct Tally {
     frames: usize,
     top: f64,
     at_ends: [u64; 2],
+    at_top: Vec<[usize; 2]>,
     /// The mean of full photosites, and how many have it.
     full: (f64, u64),
     /// What stands in for photosites that are stuck, in the order of rows; and the first of them that is not reached yet.
@@ -100,6 +105,7 @@ impl Tally {
             frames,
             top: top.unwrap_or(f64::INFINITY),
             at_ends: [0; 2],
+            at_top: Vec::new(),
             full: (full.unwrap_or(f64::INFINITY), 0),
             stand_ins,
             reached: 0,
@@ -149,7 +155,7 @@ impl Tally {
     fn gather(&mut self, site: &Site, bands: &[Vec<f32>], place: Range<usize>) {
         let columns = self.size[0];
         self.means.fill(0.0);
-        let row = self.row_means.len();
+        let (row, at_top_before) = (self.row_means.len(), self.at_ends[0]);
         let of_row = self.stand_ins[self.reached..].iter().take_while(|stuck| stuck.row == row).count();
         let stand_ins = &self.stand_ins[self.reached..self.reached + of_row];
         self.reached += of_row;
@@ -165,14 +171,35 @@ impl Tally {
             self.at_ends[0] += at_top;
             self.at_ends[1] += at_bottom;
         }
+        let mut reaches_top = self.at_ends[0] > at_top_before;
         if self.top == f64::INFINITY {
             let largest = self.samples.iter().copied().fold(self.largest.0, f64::max);
             let before = if largest > self.largest.0 { 0 } else { self.largest.1 };
             let count: u64 = self.samples.iter().map(|sample| u64::from(*sample == largest)).sum();
+            if largest > self.largest.0 {
+                self.at_top.clear();
+            }
             self.largest = (largest, before + count);
+            reaches_top = count > 0;
+        }
+        if reaches_top {
+            self.note_top(row);
         }
         let first = &self.samples[..columns];
         self.uneven += first.iter().zip(&first[1..]).map(|(one, next)| u64::from(one != next)).sum::<u64>();
+    }
+
+    /// Notes the photosites of a row that reach the top, as long as they are few.
+    fn note_top(&mut self, row: usize) {
+        let columns = self.size[0];
+        let top = if self.top < f64::INFINITY { self.top } else { self.largest.0 };
+        let most = most_at_top(self.size);
+        if self.at_top.len() <= most {
+            let reaches = |column: &usize| (0..self.frames).any(|frame| self.samples[frame * columns + column] >= top);
+            let own: Vec<[usize; 2]> =
+                (0..columns).filter(reaches).take(most + 1).map(|column| [column, row]).collect();
+            self.at_top.extend(own);
+        }
     }
 
     #[inline(always)]
@@ -342,6 +369,7 @@ impl Tally {
             variance,
             variance_variance: self.variance_variance(&drifts, n),
             at_ends: self.at_ends,
+            at_top: if self.at_top.len() <= most_at_top(self.size) { self.at_top } else { Vec::new() },
             full: self.full.1,
             largest: (self.top == f64::INFINITY).then_some(self.largest),
             temporal,
@@ -388,6 +416,11 @@ impl Tally {
     }
 }
 
+/// So many photosites of a grid that reach the top are few.
+fn most_at_top([columns, rows]: [usize; 2]) -> usize {
+    columns * rows / 100
+}
+
 /// Gathers a row of each frame and adds it.
 struct AddRow<'a> {
     tally: &'a mut Tally,
@@ -404,71 +437,6 @@ impl Kernel for AddRow<'_> {
         self.tally.gather(self.site, self.bands, self.place);
         self.tally.add_gathered();
     }
-}
-
-/// Sums run in so many lanes, whatever the instructions.
-const LANES: usize = 8;
-
-#[inline(always)]
-fn sum(values: &[f64]) -> f64 {
-    let (whole, rest) = values.as_chunks::<LANES>();
-    let mut lanes = [0.0; LANES];
-    for values in whole {
-        for (lane, value) in lanes.iter_mut().zip(values) {
-            *lane += value;
-        }
-    }
-    lanes.iter().sum::<f64>() + rest.iter().sum::<f64>()
-}
-
-/// Σ a b.
-#[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let ((whole_a, rest_a), (whole_b, rest_b)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
-    let mut lanes = [0.0; LANES];
-    for (a, b) in whole_a.iter().zip(whole_b) {
-        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
-            *lane += a * b;
-        }
-    }
-    lanes.iter().sum::<f64>() + rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum::<f64>()
-}
-
-/// Takes from samples of a frame their means, adds what is left, and its square, to those of their columns; gives Σ a, Σ a (ȳ − c)
-/// and Σ a².
-#[inline(always)]
-fn depart(samples: &mut [f64], means: &[f64], above: &[f64], [of_columns, squares]: [&mut [f64]; 2]) -> [f64; 3] {
-    let (samples, rest) = samples.as_chunks_mut::<LANES>();
-    let (means, rest_means) = means.as_chunks::<LANES>();
-    let (above, rest_above) = above.as_chunks::<LANES>();
-    let (of_columns, rest_of_columns) = of_columns.as_chunks_mut::<LANES>();
-    let (squares, rest_squares) = squares.as_chunks_mut::<LANES>();
-    let mut sums = [[0.0; LANES]; 3];
-    let columns = of_columns.iter_mut().zip(squares);
-    for (((samples, means), above), (of_columns, squares)) in samples.iter_mut().zip(means).zip(above).zip(columns) {
-        // Loaded whole, and stored whole, so that the lanes become a vector.
-        let (mut a, mut of_column, mut square) = (*samples, *of_columns, *squares);
-        for lane in 0..LANES {
-            a[lane] -= means[lane];
-            of_column[lane] += a[lane];
-            square[lane] += a[lane] * a[lane];
-            sums[0][lane] += a[lane];
-            sums[1][lane] += a[lane] * above[lane];
-            sums[2][lane] += a[lane] * a[lane];
-        }
-        (*samples, *of_columns, *squares) = (a, of_column, square);
-    }
-    let mut totals = sums.map(|lanes| lanes.iter().sum::<f64>());
-    for (index, sample) in rest.iter_mut().enumerate() {
-        *sample -= rest_means[index];
-        let a = *sample;
-        rest_of_columns[index] += a;
-        rest_squares[index] += a * a;
-        totals[0] += a;
-        totals[1] += a * rest_above[index];
-        totals[2] += a * a;
-    }
-    totals
 }
 
 /// What a scatter has beyond another that it should equal, to a relative error; nothing where that may be chance.

@@ -44,6 +44,8 @@ pub fn without_gain(
         doubts: Vec::new(),
         suspects: suspects(None, flats, all_darks, scatter),
         stuck: Vec::new(),
+        early: Vec::new(),
+        hot: None,
     }
 }
 

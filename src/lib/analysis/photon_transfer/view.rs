@@ -5,6 +5,7 @@
 //! the standard's high-pass filter, which takes from each photosite the mean of the 5x5 around it, and with it what light and lens
 //! make uneven \[EMVA1288, Sec. 8.6]. Photosites count as the grid of their class does.
 
+use super::level::Level;
 use super::sites::Site;
 use rustfft::{FftPlanner, num_complex::Complex};
 
@@ -18,6 +19,22 @@ pub const OUTSTANDING: f64 = 5.0;
 pub const NAMED: usize = 100;
 /// The median of absolute deviations of a normal law, in standard deviations.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+
+/// What the mean of frames leaves uncertain of a photosite, in the unit of its pattern.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Blur {
+    /// A standard deviation: of temporal noise.
+    pub noise: f64,
+    /// How far rounding may have it off, at most.
+    pub hidden: f64,
+}
+
+impl Blur {
+    /// Of the mean of the frames of a level, of codes whose error of rounding has such a variance.
+    pub fn of(level: &Level, rounding: f64) -> Self {
+        Self { noise: (level.variance / level.frames as f64).sqrt(), hidden: level.hidden(rounding).mean }
+    }
+}
 
 /// A photosite that stands out.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -163,11 +180,15 @@ impl Grid {
 }
 
 /// The pattern of a class whose grids are `sites` in a picture of so many columns and planes, of which `at` gives the value at an
-/// index, with what a figure shows where it `draws`; none of a grid that the filter leaves nothing of.
+/// index, as uncertain as `blur` says, with what a figure shows where it `draws`; none of a grid that the filter leaves nothing of.
+///
+/// Where rounded means of quiet photosites are mostly one number their median deviation tells no spread: none is less than that of noise,
+/// and what rounding may be off by, of a photosite one way and of those around it the other, does not stand out.
 pub fn pattern_view(
     sites: &[&Site],
     [width, planes]: [usize; 2],
     at: &(dyn Fn(usize) -> f64 + Sync),
+    blur: Blur,
     draws: bool,
 ) -> Option<PatternView> {
     if sites.iter().any(|site| site.size.iter().any(|extent| *extent < 2 * BOX)) {
@@ -187,8 +208,10 @@ pub fn pattern_view(
     let mut values: Vec<f64> = filtered.iter().flat_map(|grid| grid.values.iter().copied()).collect();
     let middle = median(&mut values);
     let mut absolute: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
-    let spread = median(&mut absolute) / NORMAL_MEDIAN;
-    let (outstanding, outliers) = outliers(sites, [&grids, &filtered], middle, spread);
+    let least = if blur.hidden > 0.0 { LEFT[0].sqrt() * blur.noise } else { 0.0 };
+    let spread = (median(&mut absolute) / NORMAL_MEDIAN).max(least);
+    let far = OUTSTANDING * spread + 2.0 * blur.hidden;
+    let (outstanding, outliers) = outliers(sites, [&grids, &filtered], middle, [spread, far]);
     let lines = [0, 1].map(|axis| {
         of_lines(
             &profiles[axis],
@@ -206,9 +229,14 @@ pub fn pattern_view(
 
 /// How many photosites stand out, and how many of a normal law would; and those that do most. One that stands out is left out of the
 /// means around its neighbors, which would stand out to the other side by a 25th of it.
-fn outliers(sites: &[&Site], [grids, filtered]: [&[Grid]; 2], middle: f64, spread: f64) -> ([f64; 2], Vec<Outlier>) {
+fn outliers(
+    sites: &[&Site],
+    [grids, filtered]: [&[Grid]; 2],
+    middle: f64,
+    [spread, far]: [f64; 2],
+) -> ([f64; 2], Vec<Outlier>) {
     let mut outliers = Vec::new();
-    let is_far = |value: f64| (value - middle).abs() > OUTSTANDING * spread && spread > 0.0;
+    let is_far = |value: f64| (value - middle).abs() > far && spread > 0.0;
     for ((site, grid), filtered) in sites.iter().zip(grids).zip(filtered) {
         let mut far: Vec<(usize, f64)> =
             filtered.values.iter().copied().enumerate().filter(|(_, value)| is_far(*value)).collect();
@@ -318,9 +346,27 @@ mod tests {
             822 => -20.0,
             _ => noise(index),
         };
-        let view = pattern_view(&[&site], [SIDE, 1], &at, false).unwrap();
+        let view = pattern_view(&[&site], [SIDE, 1], &at, Blur::default(), false).unwrap();
         let places: Vec<[usize; 2]> = view.outliers.iter().map(|outlier| [outlier.x, outlier.y]).collect();
         assert_eq!((places, view.outstanding[0]), (vec![[20, 20], [22, 20]], 2.0));
         assert!((view.outliers[1].deviation + 20.0 * 23.0 / 24.0).abs() < 1.0, "{:?}", view.outliers[1]);
+    }
+
+    /// Of means that are mostly one code, and of every twentieth photosite between it and the next, one that is 5 codes off stands out.
+    #[test]
+    fn what_rounding_makes_does_not_stand_out() {
+        const SIDE: usize = 60;
+        let site = Site { class: "Y".into(), plane: 0, first: [0, 0], step: [1, 1], size: [SIDE, SIDE] };
+        let chance = |index: usize, key: u32| {
+            f64::from(philox4x32_10([u32::try_from(index).unwrap(), 0, 0, 0], [1, key])[0]) / 4_294_967_296.0
+        };
+        let at = |index: usize| match index {
+            1830 => 105.0,
+            _ if chance(index, 2) < 0.05 => 100.0 + chance(index, 3),
+            _ => 100.0,
+        };
+        let counted = |blur: Blur| pattern_view(&[&site], [SIDE, 1], &at, blur, false).unwrap().outstanding[0];
+        assert_eq!(counted(Blur { noise: 0.04, hidden: 0.4 }), 1.0);
+        assert!(counted(Blur::default()) > 100.0);
     }
 }

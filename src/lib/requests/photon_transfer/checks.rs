@@ -1,7 +1,7 @@
 //! What frames of a measurement must have in common, and what may be wrong with them.
 
 use super::conditions::{Group, Head};
-use crate::analysis::photon_transfer::{LEAST_VARIANCE, SiteSurvey, Survey};
+use crate::analysis::photon_transfer::{LEAST_VARIANCE, Print, SiteSurvey, Survey};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
@@ -158,22 +158,34 @@ pub fn doubt_of_codes(list: &str, head: &FrameHeader, groups: &[Group], surveys:
     shifted.into_iter().chain(ended).map(Note::Warning).collect()
 }
 
-/// The largest code by the brightest flats, of which most samples are one code that none is above, where noise of darks would spread
-/// those of photosites that are full; samples at it are counted then.
+/// The largest code by the brightest flats, of which most samples are one code that none is above, where noise of the read-out would spread
+/// those of photosites that are full: that of the darks which have least, as dark charge has none where photosites are full, or of
+/// codes that end as those of 8 to 16 bits do. Samples at it are counted then.
 pub fn end_of_codes(groups: &[Group], surveys: &mut [Survey]) -> Option<f64> {
     /// Most samples.
     const MOST: f64 = 0.5;
     let is_lit = |place: &usize| groups[*place].condition.is_lit;
     let noise = |survey: &Survey| survey.sites.iter().map(|site| site.variance).fold(0.0, f64::max);
-    let dark_noise =
-        (0..groups.len()).filter(|place| !is_lit(place)).map(|place| noise(&surveys[place])).fold(0.0, f64::max);
+    let darks = (0..groups.len()).filter(|place| !is_lit(place));
+    let mut of_times: Vec<[f64; 2]> =
+        darks.map(|place| [groups[place].condition.exposure_s.unwrap_or(0.0), noise(&surveys[place])]).collect();
+    of_times.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let least = of_times.iter().map(|[_, variance]| *variance).reduce(f64::min).unwrap_or(0.0);
+    // That of no time, by the shortest and the longest.
+    let dark_noise = match of_times[..] {
+        [[short_s, short], .., [long_s, long]] if long_s > short_s => {
+            least.min(short - short_s * (long - short) / (long_s - short_s))
+        }
+        _ => least,
+    };
     let lit = || (0..groups.len()).filter(is_lit).flat_map(|place| &surveys[place].sites);
     let largest = lit().filter_map(|site| site.largest).map(|(largest, _)| largest).fold(f64::NEG_INFINITY, f64::max);
     let is_most = |site: &SiteSurvey| {
         let (own, count) = site.largest.unwrap_or_default();
         own == largest && count as f64 > MOST * (site.count() * site.frames) as f64
     };
-    if dark_noise < LEAST_VARIANCE || !lit().any(is_most) {
+    let is_full_scale = (8..=16).any(|bits| f64::from(bits).exp2() - 1.0 == largest);
+    if (dark_noise < LEAST_VARIANCE && !is_full_scale) || !lit().any(is_most) {
         return None;
     }
     for site in surveys.iter_mut().flat_map(|survey| &mut survey.sites) {
@@ -205,17 +217,33 @@ pub fn doubt_of_frames(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
     const SHARE: f64 = 0.5;
     /// Standard deviations of a mean that are far beyond chance.
     const BEYOND: f64 = 10.0;
+    /// Means of so many darks tell by how much those of most differ, and so many times that is more than chance.
+    const SEVERAL: usize = 3;
+    const MOST: f64 = 6.0;
     let dark = |site: usize| {
         let darks = groups.iter().zip(surveys).filter(|(group, _)| !group.condition.is_lit);
         darks.map(|(_, survey)| survey.sites[site].mean).fold(f64::INFINITY, f64::min)
     };
+    // A black level that moves does so at most exposure times.
+    let range = |survey: &Survey| {
+        let of = |site: &SiteSurvey| {
+            let [low, high] = ends_of(&site.frame_means);
+            site.frame_means[high] - site.frame_means[low]
+        };
+        survey.sites.iter().map(of).fold(0.0, f64::max)
+    };
+    let darks = groups.iter().zip(surveys).filter(|(group, _)| !group.condition.is_lit);
+    let mut ranges: Vec<f64> = darks.map(|(_, survey)| range(survey)).collect();
+    ranges.sort_by(f64::total_cmp);
+    let of_most = if ranges.len() >= SEVERAL { MOST * ranges[(ranges.len() - 1) / 2] } else { 0.0 };
     let doubt = |(group, survey): (&Group, &Survey)| {
         survey.sites.iter().enumerate().find_map(|(index, site)| {
             let [low, high] = ends_of(&site.frame_means);
             let [least, most] = [low, high].map(|frame| site.frame_means[frame]);
             let light = Some(dark(index)).filter(|dark| dark.is_finite()).map_or(most, |dark| most - dark);
             let noise = (site.mean_variance * site.frames as f64).sqrt();
-            let allowed = if group.condition.is_lit { SHARE * light } else { MUCH * site.variance.sqrt() };
+            let of_dark = || of_most.max(MUCH * site.variance.sqrt());
+            let allowed = if group.condition.is_lit { SHARE * light } else { of_dark() };
             let is_far = most - least > allowed.max(BEYOND * noise).max(1.0);
             let [first, second] = [low, high].map(|frame| group.files[frame].display().to_string());
             let what = if group.condition.is_lit { "flats of one light" } else { "darks of one exposure" };
@@ -240,17 +268,41 @@ fn ends_of(means: &[f64]) -> [usize; 2] {
 /// Frames of one light whose means differ by more than this share were taken under several.
 const SAME_LIGHT: f64 = 0.1;
 
-/// Makes sure that means of frames are those of one light.
+/// Makes sure that no frame of one condition is a copy of one of another.
 ///
 /// # Errors
 ///
 /// [`Error::Data`].
-pub fn check_same_light(group: &Group, means: &[f64], top: Option<f64>) -> Result<()> {
+pub fn check_no_copies(groups: &[Group], surveys: &[Survey]) -> Result<()> {
+    let mut known: HashMap<Print, &Path> = HashMap::new();
+    for (group, survey) in groups.iter().zip(surveys) {
+        for (file, print) in group.files.iter().zip(&survey.prints) {
+            if let Some(other) = known.insert(*print, file) {
+                let [one, other] = [other.display(), file.display()];
+                let problem = format!("{one} and {other}: their samples are the same, or differ by one number alone");
+                let problem = problem + ", and they are said to be of different light or time";
+                return Err(Error::Data(problem + "; copies of one exposure do not count as two"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Makes sure that means of frames at the photosites of a grid are those of one light, of codes that reach so far.
+///
+/// # Errors
+///
+/// [`Error::Data`].
+pub fn check_same_light(group: &Group, site: &SiteSurvey, reach: f64) -> Result<()> {
+    /// The black level moves by so many standard deviations of a sample, and light may not.
+    const MUCH: f64 = 5.0;
+    let means = &site.frame_means;
     let [least, most] =
         [means.iter().copied().fold(f64::INFINITY, f64::min), means.iter().copied().fold(0.0, f64::max)];
     // Of codes near the black level a tenth is little light.
-    let scale = top.map_or(most, |top| most.max(top / 10.0));
-    if most - least > SAME_LIGHT * scale {
+    let by_share = SAME_LIGHT * most.max(reach / 10.0);
+    let by_noise = if group.condition.is_lit { 0.0 } else { MUCH * site.variance.sqrt() };
+    if most - least > by_share.max(by_noise) {
         let at = |wanted: f64| {
             means.iter().position(|mean| *mean == wanted).map_or(Path::new("?"), |index| &group.files[index])
         };
@@ -334,6 +386,12 @@ mod tests {
         let at_end: Vec<u64> = ended.iter().map(|survey| survey.sites[0].at_ends[0]).collect();
         assert!(at_end[..2] == [0, 0] && at_end[2] > 400, "{at_end:?}");
         assert_eq!(end_of(&mut [of(10.0, 1.0, 255.0), of(100.0, 1.0, 255.0), of(200.0, 1.0, 255.0)]), None);
-        assert_eq!(end_of(&mut [of(10.0, 0.0, 255.0), of(100.0, 1.0, 255.0), of(254.0, 1.0, 255.0)]), None);
+        // Darks without noise do not spread what is full, unless codes end there whatever noise does.
+        assert_eq!(end_of(&mut [of(10.0, 0.0, 250.0), of(100.0, 1.0, 250.0), of(254.0, 1.0, 250.0)]), None);
+        assert_eq!(end_of(&mut [of(10.0, 0.0, 255.0), of(100.0, 1.0, 255.0), of(254.0, 1.0, 255.0)]), Some(255.0));
+        // Nor does noise that only longer darks have, that of their charge.
+        let groups = [group(false), group(false), group(true), group(true)];
+        let mut of_charge = [of(10.0, 0.0, 250.0), of(20.0, 1.0, 250.0), of(100.0, 1.0, 250.0), of(254.0, 1.0, 250.0)];
+        assert_eq!(end_of_codes(&groups, &mut of_charge), None);
     }
 }

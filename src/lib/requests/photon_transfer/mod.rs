@@ -9,7 +9,7 @@ use super::notes::Note;
 use super::options::Selection;
 use super::values;
 use crate::analysis::photon_transfer::{
-    ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, Suspect, left_in_mean, pattern_view,
+    Blur, ClassFindings, Condition, Level, PatternView, Settings, Site, Survey, Suspect, left_in_mean, pattern_view,
 };
 use crate::error::{Error, Result};
 use crate::formats::frame_list::{self, FrameList};
@@ -115,9 +115,11 @@ impl PhotonTransfer {
         let settings =
             Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes, top: largest };
         let temperature_k = main_temperature(&groups);
-        let classes = taken.measured(temperature_k, &settings)?;
+        let mut classes = taken.measured(temperature_k, &settings)?;
+        taken.find_hot(&mut classes, temperature_k, settings.rounding())?;
         let surveys = taken.found;
-        let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys, draws)).collect();
+        let rounding = settings.rounding();
+        let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys, rounding, draws)).collect();
         notes.extend(doubts_of_levels(&classes, &groups));
         notes.extend(classes.iter().flat_map(notes_of));
         let count = |is_lit: bool| {
@@ -204,7 +206,13 @@ fn notes_of(class: &ClassFindings) -> Vec<Note> {
 }
 
 /// What the patterns of a class look like: that of light, a share of the signal, and that of the dark, in samples.
-fn patterns(head: &FrameHeader, class: &ClassFindings, surveys: &[Survey], draws: bool) -> [Option<PatternView>; 2] {
+fn patterns(
+    head: &FrameHeader,
+    class: &ClassFindings,
+    surveys: &[Survey],
+    rounding: f64,
+    draws: bool,
+) -> [Option<PatternView>; 2] {
     let sites = Site::of(head);
     let own: Vec<&Site> = sites.iter().filter(|site| site.class == class.name).collect();
     let size = [head.geometry.width, head.geometry.channels.len()];
@@ -212,27 +220,28 @@ fn patterns(head: &FrameHeader, class: &ClassFindings, surveys: &[Survey], draws
         let (place, signal) = class.stacks[stack]?;
         surveys[place].picture.as_deref().map(|picture| (picture, signal))
     };
-    // Temporal noise of rows and columns that is left in the means is no pattern.
+    // Temporal noise that is left in the means is no pattern, nor is that of rows and columns.
     let left = |stack: usize| {
         let (place, _) = class.stacks[stack]?;
         let own = sites.iter().zip(&surveys[place].sites).filter(|(site, _)| site.class == class.name);
         let level = Level::of(place, Condition::default(), own.map(|(_, survey)| survey.clone()).collect());
-        (level.frames >= 2).then(|| left_in_mean(&level))
+        (level.frames >= 2).then(|| (left_in_mean(&level), Blur::of(&level, rounding)))
     };
-    let [of_flat, of_dark] = [0, 1].map(|stack| left(stack).unwrap_or_default());
+    let [(of_flat, flat_blur), (of_dark, dark_blur)] = [0, 1].map(|stack| left(stack).unwrap_or_default());
     let without = |mut view: PatternView, left: [f64; 2]| {
         view.lines.iter_mut().zip(left).for_each(|([variance, _], left)| *variance -= left);
         view
     };
     let of_dark_alone = || {
         let (dark, _) = picture(1)?;
-        let view = pattern_view(&own, size, &|index| f64::from(dark[index]), draws)?;
+        let view = pattern_view(&own, size, &|index| f64::from(dark[index]), dark_blur, draws)?;
         Some(without(view, of_dark))
     };
     let of_light = || {
         let ((flat, signal), (dark, _)) = picture(0).zip(picture(1))?;
         let share = |index: usize| (f64::from(flat[index]) - f64::from(dark[index])) / signal;
-        let view = pattern_view(&own, size, &share, draws)?;
+        let (noise, hidden) = (flat_blur.noise.hypot(dark_blur.noise), flat_blur.hidden + dark_blur.hidden);
+        let view = pattern_view(&own, size, &share, Blur { noise: noise / signal, hidden: hidden / signal }, draws)?;
         Some(without(view, [0, 1].map(|axis| (of_flat[axis] + of_dark[axis]) / (signal * signal))))
     };
     let (light, dark) = rayon::join(of_light, of_dark_alone);

@@ -1,10 +1,11 @@
 //! What the frames of all conditions tell: flats first, which show where photosites are full, then darks; and again without photosites
 //! that are stuck, where there are some.
 
-use super::checks::{check_same_light, end_of_codes};
+use super::checks::{check_no_copies, check_same_light, end_of_codes};
 use super::conditions::{Group, Reading};
 use crate::analysis::photon_transfer::{
-    Asked, ClassFindings, Condition, Level, Picture, Settings, Site, Stuck, Survey, full_mean, of_class, survey_as,
+    Asked, Blur, ClassFindings, Condition, Level, Picture, Settings, Site, SiteSurvey, Stuck, Survey, dark_of_tail,
+    full_mean, hot_tail, of_class, survey_as,
 };
 use crate::error::{Error, Result};
 use crate::formats::many::OneOfMany;
@@ -41,6 +42,7 @@ impl<'a> Surveys<'a> {
         let (full, stuck, found) = (None, Stuck::default(), Vec::new());
         let mut surveys = Self { head, groups, read, are_codes, largest, is_said, full, stuck, found };
         surveys.read_all()?;
+        check_no_copies(groups, &surveys.found)?;
         Ok(surveys)
     }
 
@@ -57,6 +59,12 @@ impl<'a> Surveys<'a> {
             if is_lit {
                 self.full = self.full_mean(&found);
             }
+        }
+        // Where the largest code is not known, the brightest flats tell how far codes reach.
+        let means = |survey: &Survey| survey.sites.iter().map(|site| site.mean).fold(0.0, f64::max);
+        let reach = self.largest.unwrap_or_else(|| found.iter().flatten().map(means).fold(0.0, f64::max));
+        for (group, survey) in self.groups.iter().zip(&found) {
+            survey.iter().flat_map(|survey| &survey.sites).try_for_each(|site| check_same_light(group, site, reach))?;
         }
         self.found = found.into_iter().flatten().collect();
         if !self.is_said && self.are_codes {
@@ -96,7 +104,6 @@ impl<'a> Surveys<'a> {
                     format!("{file}: its mean is {mean:.1}, above the largest code, {top}; name the right one");
                 return Err(Error::Usage(problem).change(&["white"]));
             }
-            check_same_light(group, &site.frame_means, top)?;
         }
         if let Some([one, other]) = found.sites.iter().find_map(|site| site.copies) {
             let [one, other] = [one, other].map(|frame| group.files[frame].display());
@@ -131,7 +138,11 @@ impl<'a> Surveys<'a> {
     pub fn measured(&mut self, temperature_k: Option<f64>, settings: &Settings) -> Result<Vec<ClassFindings>> {
         let classes = self.findings(temperature_k, settings);
         self.keep_pictures(&classes)?;
-        let Some(all) = self.stuck_photosites(&classes)? else { return Ok(classes) };
+        let all = self.stuck_photosites(&classes)?.unwrap_or_default();
+        let all = all.with_early(&Site::of(self.head), &self.early());
+        if !all.is_any() {
+            return Ok(classes);
+        }
         self.stuck = all.few();
         let mut classes = classes;
         if self.stuck.is_any() {
@@ -140,6 +151,14 @@ impl<'a> Surveys<'a> {
             self.keep_pictures(&classes)?;
         }
         for class in &mut classes {
+            class.early = self.stuck.early_of_class(&class.name);
+            if !class.early.is_empty() {
+                let count = class.early.len();
+                class.notes.push(format!(
+                    "photosites that are full, or reach the largest code, under light that is far from it, as hot ones do, are left out of all numbers, dark \
+                     current and its pattern too: {count}, which `defects.clipped` of the JSON names"
+                ));
+            }
             class.stuck = self.stuck.of_class(&class.name);
             let share = all.share(&class.name);
             if !class.stuck.is_empty() {
@@ -156,6 +175,36 @@ impl<'a> Surveys<'a> {
             }
         }
         Ok(classes)
+    }
+
+    /// Finds hot photosites apart from all others, of each class, in the darks of such a temperature.
+    ///
+    /// # Errors
+    ///
+    /// Those of the frames.
+    pub fn find_hot(&mut self, classes: &mut [ClassFindings], temperature_k: Option<f64>, rounding: f64) -> Result<()> {
+        let Geometry { width, channels, .. } = &self.head.geometry;
+        let (size, sites) = ([*width, channels.len()], Site::of(self.head));
+        for class in classes {
+            let is_own = |condition: &Condition| {
+                !condition.is_lit && (condition.temperature_k == temperature_k || condition.temperature_k.is_none())
+            };
+            let darks: Vec<Level> = (0..self.groups.len())
+                .filter(|place| is_own(&self.groups[*place].condition))
+                .map(|place| self.level(&class.name, place, &self.found[place]))
+                .collect();
+            let Some((dark, exposure_s)) =
+                dark_of_tail(&darks).and_then(|dark| Some((dark, dark.condition.exposure_s?)))
+            else {
+                continue;
+            };
+            self.keep_picture(dark.place)?;
+            let blur = Blur::of(dark, rounding);
+            let own: Vec<&Site> = sites.iter().filter(|site| site.class == class.name).collect();
+            let picture = self.found[dark.place].picture.as_deref();
+            class.hot = picture.and_then(|picture| hot_tail(&own, size, picture, exposure_s, blur));
+        }
+        Ok(())
     }
 
     fn keep_pictures(&mut self, classes: &[ClassFindings]) -> Result<()> {
@@ -175,6 +224,44 @@ impl<'a> Surveys<'a> {
             self.found[place].sites.iter_mut().zip(ends).for_each(|(site, ends)| site.at_ends = ends);
         }
         Ok(())
+    }
+
+    /// Photosites of each grid that have samples at the largest code, or are full in the flats whose picture is kept, where the mean of
+    /// these is so far below that noise and pattern of all others do not reach it: columns and rows.
+    fn early(&self) -> Vec<Vec<[usize; 2]>> {
+        /// Standard deviations that noise and pattern do not reach over.
+        const BEYOND: f64 = 6.0;
+        /// Fits take flats up to this share of saturation.
+        const SHARE: f64 = 0.7;
+        let sites = Site::of(self.head);
+        let Geometry { width, channels, .. } = &self.head.geometry;
+        let lit = || self.groups.iter().zip(&self.found).filter(|(group, _)| group.condition.is_lit);
+        let is_far = |site: &SiteSurvey, end: f64| {
+            let spread = (site.variance + site.spatial.rest.value).sqrt();
+            site.mean + BEYOND * spread < end && site.mean < SHARE * end
+        };
+        let of = |(grid, site): (usize, &Site)| {
+            let mut places: Vec<[usize; 2]> = Vec::new();
+            for (_, survey) in lit() {
+                let own = &survey.sites[grid];
+                if self.largest.is_some_and(|top| own.at_ends[0] > 0 && is_far(own, top)) {
+                    places.extend(&own.at_top);
+                }
+                let full = self.full.filter(|full| is_far(own, *full));
+                if let Some((picture, full)) = survey.picture.as_deref().zip(full) {
+                    let mean = |[column, row]: [usize; 2]| {
+                        let [x, y] = [site.first[0] + column * site.step[0], site.first[1] + row * site.step[1]];
+                        f64::from(picture[(y * channels.len() + site.plane) * width + x])
+                    };
+                    let all = (0..site.size[1]).flat_map(|row| (0..site.size[0]).map(move |column| [column, row]));
+                    places.extend(all.filter(|place| mean(*place) >= full));
+                }
+            }
+            places.sort_by_key(|[column, row]| (*row, *column));
+            places.dedup();
+            places
+        };
+        if self.are_codes { sites.iter().enumerate().map(of).collect() } else { vec![Vec::new(); sites.len()] }
     }
 
     /// Photosites that hold one value, by a flat and the dark of the time nearest to its own; none where there are none, or no dark.

@@ -3,29 +3,39 @@
 use super::super::fit::{Line, Point, variance_besides};
 use super::{Beneath, Curve};
 
+/// How much of the gain a response that bends makes it miss.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bend {
+    /// A share of the gain.
+    pub missed: f64,
+    /// What that scatters by, as levels miss a response that bends evenly.
+    pub scatter: f64,
+    /// Of how many levels that is known.
+    pub freedom: f64,
+}
+
 impl Curve {
-    /// How much of the gain a response that bends makes it miss, a share of it, and what that scatters by; none of light that is not
-    /// known.
+    /// How much of the gain a response that bends makes it miss; none of light that is not known.
     ///
     /// Where a signal is R x (1 + ε x), of shot noise alone its variance is (1 + 2 ε x)² of that of a straight response over
     /// (1 + ε x): to first order 3 ε x more at signal K n, which the line through the levels takes for gain.
     ///
     /// What rounding hides of the black level is common to all levels: of what it lets the share be the least counts.
-    pub fn bend(&self) -> Option<[f64; 2]> {
+    pub fn bend(&self) -> Option<Bend> {
         let bends = [-1.0, 0.0, 1.0].map(|sign| self.bend_above(sign));
-        let [Some([low, _]), Some([_, scatter]), Some([high, _])] = bends else { return None };
-        let least = if low * high <= 0.0 {
+        let [Some(Bend { missed: low, .. }), Some(own), Some(Bend { missed: high, .. })] = bends else { return None };
+        let missed = if low * high <= 0.0 {
             0.0
         } else if low.abs() < high.abs() {
             low
         } else {
             high
         };
-        Some([least, scatter])
+        Some(Bend { missed, ..own })
     }
 
     /// The same where black is as much more as rounding may hide, times a sign.
-    fn bend_above(&self, sign: f64) -> Option<[f64; 2]> {
+    fn bend_above(&self, sign: f64) -> Option<Bend> {
         let above_black = |flat: usize| self.signal(flat) - sign * self.hidden_beneath(flat);
         let light = |flat: usize| self.flats[flat].photons.map(|photons| photons.value).or(self.flats[flat].exposure_s);
         let known: Vec<usize> =
@@ -56,12 +66,14 @@ impl Curve {
         let missed = |bend: f64| {
             let at = |(place, &flat): (usize, &usize)| {
                 let (x, signal) = (light(flat).unwrap_or(0.0) / brightest, above_black(flat));
-                Point { x: signal, y: 3.0 * bend * x * signal, weight: self.weights.gain[place] }
+                let of_dark = self.charge_of_noise(flat) - self.signal(flat);
+                Point { x: signal + of_dark, y: 3.0 * bend * x * signal, weight: self.weights.gain[place] }
             };
             let points: Vec<Point> = self.fitted.iter().enumerate().map(at).collect();
             let line = if self.is_offset_free { Line::through(points) } else { Line::through_zero(points) };
             line.map(|line| line.slope)
         };
-        Some([missed(line.slope / line.offset)?, missed(spread.sqrt().recip() / line.offset)?.abs()])
+        let scatter = missed(spread.sqrt().recip() / line.offset)?.abs();
+        Some(Bend { missed: missed(line.slope / line.offset)?, scatter, freedom })
     }
 }

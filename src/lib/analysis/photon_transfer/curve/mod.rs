@@ -14,6 +14,7 @@ mod ends;
 mod point;
 mod weights;
 
+pub use bend::Bend;
 pub use ends::{
     LEAST_VARIANCE, are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, stuck_shares, without_stuck,
 };
@@ -57,7 +58,8 @@ pub struct Curve {
     patterned: Vec<usize>,
     /// The flat whose variance is the largest, where brighter ones have less.
     pub saturated: Option<usize>,
-    /// Whether the variance of no light is left to the fit, as darks are silent beneath the rounding, clipped, or absent.
+    /// Whether the variance of no light is left to the fit, as darks are silent beneath the rounding, clipped, or absent, or of times that
+    /// are not known.
     pub is_offset_free: bool,
     /// Whether there are darks, and their temporal noise is so small that rounding hides it.
     pub is_silent: bool,
@@ -276,6 +278,26 @@ impl Curve {
         self.no_light(flat).is_some()
     }
 
+    /// Whether the dark noise is what the line through the flats ends in, as the darks that there are do not tell it.
+    pub fn is_noise_of_line(&self) -> bool {
+        self.is_offset_free && !self.tells_dark_noise()
+    }
+
+    /// Whether what the variance of a flat goes by is above no light.
+    fn knows_charge(&self, flat: usize) -> bool {
+        self.times() >= 2 || self.knows_black(flat)
+    }
+
+    /// The exposure time that the dark noise is of, in s, where it is known; none of noise of no time.
+    pub fn time_of_noise(&self) -> Option<Option<f64>> {
+        if self.is_noise_of_line() {
+            let longest = || self.fitted.iter().filter_map(|&flat| self.flats[flat].exposure_s).reduce(f64::max);
+            return (self.times() < 2).then(longest);
+        }
+        let shortest = || self.darks.iter().filter_map(|dark| dark.exposure_s).reduce(f64::min);
+        (self.times() < 3).then(shortest).filter(|time| *time != Some(0.0))
+    }
+
     /// Whether the temporal variance of darks is that of their noise.
     pub fn tells_dark_noise(&self) -> bool {
         !self.is_silent && !self.are_darks_clipped
@@ -294,9 +316,16 @@ impl Curve {
         self.flats[flat].variance.value - dark
     }
 
+    /// What the variance of a flat goes by: its mean above no light; or, where the line ends in the variance of no light, its whole charge,
+    /// above no light and no time, where darks tell that: so that no shot noise of the dark charge stands at the end.
+    pub fn charge_of_noise(&self, flat: usize) -> f64 {
+        let lines = self.dark_lines().filter(|_| self.is_offset_free && !self.are_darks_clipped);
+        lines.map_or_else(|| self.signal(flat), |[mean, _]| self.flats[flat].mean.value - mean.offset)
+    }
+
     fn gain_points(&self) -> impl Iterator<Item = Point> + Clone {
         self.fitted.iter().enumerate().map(|(place, &flat)| Point {
-            x: self.signal(flat),
+            x: self.charge_of_noise(flat),
             y: self.noise(flat),
             weight: self.weights.gain.get(place).copied().unwrap_or(1.0),
         })
@@ -347,7 +376,8 @@ impl Curve {
         let measured =
             lines.map(|[_, variance]| variance.offset).or_else(|| shortest().map(|dark| dark.variance.value));
         let has_darks = !self.darks.is_empty() && !self.are_darks_clipped;
-        let dark_variance = if self.is_offset_free { Some(line.offset) } else { measured };
+        let by_line = || self.fitted.iter().all(|&flat| self.knows_charge(flat)).then_some(line.offset);
+        let dark_variance = if self.is_noise_of_line() { by_line() } else { measured };
         Some(Values {
             gain: line.slope,
             dark_variance: dark_variance.filter(|_| has_darks),

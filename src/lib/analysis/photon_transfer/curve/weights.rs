@@ -22,7 +22,7 @@ impl Curve {
                 .iter()
                 .map(|&flat| {
                     let dark = self.no_light(flat).map_or(0.0, |[_, variance]| variance);
-                    let level = line.at(self.signal(flat)) + if self.is_offset_free { 0.0 } else { dark };
+                    let level = line.at(self.charge_of_noise(flat)) + if self.is_offset_free { 0.0 } else { dark };
                     let point = &self.flats[flat];
                     let beneath = self.scatter_beneath(flat);
                     let of_dark = if self.is_offset_free { 0.0 } else { beneath[1] };

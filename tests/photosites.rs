@@ -1,0 +1,137 @@
+//! Photosites that are not like the others, hot, stuck or clipped, in what photon transfer finds of a camera.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::analysis::photon_transfer::{Condition, full_mean};
+use cyanometer::camera::readout::ReadOut;
+use rayon::prelude::*;
+use support::misses::check_misses;
+use support::photon_transfer::{FLAT_S, Kind, Shake, camera, found, level_in, levels};
+use support::workshop::Workshop;
+
+/// Cameras of which two in a hundred photosites are hot: dark current and patterns of the dark lie within their
+/// intervals as often as is stated. Of n cameras so many may miss by chance: 4 standard deviations beyond 5 %.
+#[test]
+fn hot_photosites_widen_intervals_of_the_dark() {
+    const OF_DARK: [&str; 4] = ["dsnu_e", "dsnu_pixel_e", "dark_current_e_per_s", "dcnu"];
+    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(40, |count| count.parse().unwrap());
+    let found: Vec<[Option<bool>; 4]> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let plain = camera(index, Kind::Ccd);
+            // No photosite is full after the longest exposure, 1 s.
+            let current = plain.dark_current_e_per_s.unwrap().min(plain.full_well_e / 50.0);
+            let (share, hot) = (0.02, 5.0 * current);
+            let readout = ReadOut {
+                dark_current_e_per_s: Some(current),
+                hot_pixel_share: share,
+                hot_pixel_dark_current_e_per_s: hot,
+                ..plain
+            };
+            let [flats, darks] = levels(&readout, index);
+            let found = found(&flats, &darks);
+            let mean = current + share * hot;
+            // An exponential law has a variance of the square of its mean.
+            let variance = (readout.dcnu * mean).powi(2) + share * (2.0 - share) * hot * hot;
+            let of_flats = variance.sqrt() * FLAT_S;
+            let truths = [of_flats, of_flats, mean, variance.sqrt() / mean];
+            let holds = |(key, truth): (&str, f64)| {
+                let interval = found.get(key)?;
+                Some((interval.low..=interval.high).contains(&truth))
+            };
+            [0, 1, 2, 3].map(|place| holds((OF_DARK[place], truths[place])))
+        })
+        .collect();
+    for (place, key) in OF_DARK.iter().enumerate() {
+        check_misses(key, found.iter().map(|held| held[place]));
+    }
+}
+
+/// Hot photosites that are full in the longer darks, and as many as are at the largest code there: dark current and its pattern are
+/// those of shorter darks, or the reason is that.
+#[test]
+fn full_hot_photosites_do_not_count_in_dark_current() {
+    const OF_DARK: [&str; 2] = ["dark_current_e_per_s", "dcnu"];
+    let found: Vec<[Option<bool>; 2]> = (0..40_u32)
+        .into_par_iter()
+        .map(|index| {
+            let plain = camera(index, Kind::Ccd);
+            let current = plain.dark_current_e_per_s.unwrap().min(plain.full_well_e / 50.0);
+            // Of a hundred hot photosites one has 4.6 times the mean: full after a quarter of a second, or half of one.
+            let (share, hot) = (0.02, 0.6 * plain.full_well_e);
+            let readout = ReadOut {
+                dark_current_e_per_s: Some(current),
+                hot_pixel_share: share,
+                hot_pixel_dark_current_e_per_s: hot,
+                ..plain
+            };
+            let [flats, mut darks] = levels(&readout, index);
+            let full = full_mean(&flats);
+            for (place, exposure_s) in (0..).zip([0.003, 0.006, 0.01, 0.05]) {
+                let condition = Condition { exposure_s: Some(exposure_s), ..darks[0].condition };
+                darks.push(level_in((&readout, index, Shake::default()), condition, 0.0, [4, 500 + 4 * place], full));
+            }
+            let found = found(&flats, &darks);
+            let mean = current + share * hot;
+            let variance = (readout.dcnu * mean).powi(2) + share * (2.0 - share) * hot * hot;
+            let truths = [mean, variance.sqrt() / mean];
+            [0, 1].map(|place| {
+                let interval = found.get(OF_DARK[place])?;
+                Some((interval.low..=interval.high).contains(&truths[place]))
+            })
+        })
+        .collect();
+    for (place, key) in OF_DARK.iter().enumerate() {
+        let known = check_misses(key, found.iter().map(|held| held[place]));
+        assert!(known >= 20, "{key} is known of {known} cameras alone");
+    }
+}
+
+/// Of a camera three photosites that hold the largest code, one value, and code 0 with light and without are named and left out: its
+/// patterns are those without them, dead ones empty no report, and their neighbors do not stand out.
+#[test]
+fn stuck_photosites_are_named_and_left_out() {
+    const STUCK: [([usize; 2], f32); 3] = [([20, 10], 4095.0), ([31, 21], 900.0), ([40, 30], 0.0)];
+    let shop = Workshop::new();
+    for folder in ["whole", "stuck"] {
+        std::fs::create_dir(shop.path(folder)).unwrap();
+    }
+    for level in [0, 500, 2000, 5000, 10_000, 15_000, 20_000, 25_000, 30_000, 35_000] {
+        for frame in 1..3 {
+            let kind = if level == 0 { "dark" } else { "flat" };
+            let name = format!("{kind}-{level}-{frame}.exr");
+            shop.pipe(&format!(
+                "render-radiance --electrons {level},{level},{level} --size 64x48 --cfa rggb | add-noise --frame {level}{frame} | \
+                 digitize -o whole/{name}"
+            ));
+            let mut taken = shop.frame(&format!("whole/{name}"));
+            for ([x, y], code) in STUCK {
+                taken.samples[y * 64 + x] = code;
+            }
+            shop.write(&format!("stuck/{name}"), &taken.header, &taken.samples);
+        }
+    }
+    let channels = |folder: &str| -> serde_json::Value {
+        let told = shop.run(&format!("photon-transfer {folder} --output-format json"), &[]);
+        serde_json::from_slice::<serde_json::Value>(&told).unwrap()["channels"].clone()
+    };
+    let [whole, stuck] = ["whole", "stuck"].map(channels);
+    let mut places: Vec<[u64; 2]> = Vec::new();
+    for (whole, stuck) in whole.as_array().unwrap().iter().zip(stuck.as_array().unwrap()) {
+        for key in ["gain_adu_per_e", "prnu", "prnu_pixel", "dsnu_e", "dsnu_pixel_e", "dark_noise_e"] {
+            let [own, wanted] = [stuck, whole].map(|channel| channel[key]["value"].as_f64().unwrap());
+            assert!((own / wanted - 1.0).abs() < 0.02, "{} {key}: {own} {wanted}", whole["name"]);
+        }
+        for place in ["light", "dark"] {
+            let [own, wanted] = [stuck, whole].map(|channel| channel["defects"][place]["count"].as_f64().unwrap());
+            assert!((own - wanted).abs() <= 1.0, "{} {place}: {own} {wanted}", whole["name"]);
+        }
+        let sites = stuck["defects"]["stuck"]["sites"].as_array().unwrap();
+        places.extend(sites.iter().map(|site| ["x", "y"].map(|axis| site[axis].as_u64().unwrap())));
+        assert_eq!(whole["defects"]["stuck"]["count"], 0);
+    }
+    places.sort_unstable();
+    assert_eq!(places, STUCK.map(|([x, y], _)| [x as u64, y as u64]));
+}
