@@ -56,9 +56,8 @@ fn what_is_said_of_a_camera_counts_for_frames_beside() {
     }
     assert_eq!(shop.sidecar("described.dng").cfa.unwrap().to_string(), "grbg");
     // Flats alone: the black level is that of the description.
-    let black =
-        format!("correct-frame light.raw --raw 384x32:u16le --flat flat.raw --black 500 --metadata said.yaml -o b.exr");
-    assert_eq!(shop.said(&black, 0), "");
+    let black = "correct-frame light.raw --raw 384x32:u16le --flat flat.raw --black 500 --metadata said.yaml -o b.exr";
+    assert_eq!(shop.said(black, 0), "");
     assert!(
         shop.said(&format!("{line} --flat-dark flat-dark.raw --scale-dark --metadata said.yaml -o s.exr"), BAD_DATA)
             .contains("dark.raw: nothing tells its exposure time")

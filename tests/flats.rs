@@ -14,6 +14,9 @@ const SIZE: [u32; 2] = [161, 121];
 const BLACK: f64 = 500.0;
 const WHITE: f64 = 16_000.0;
 
+/// Codes by column and row.
+type Codes = Box<dyn Fn(u32, u32) -> f64>;
+
 /// The class R, G or B of a photosite of RGGB.
 fn class(x: u32, y: u32) -> usize {
     (x % 2 + y % 2) as usize
@@ -69,7 +72,7 @@ fn saturated_and_defective_places_tilt_no_class() {
         true => BLACK,
         false => lit([7000.0; 3], 2)(x, y),
     };
-    let cases: [(&str, Box<dyn Fn(u32, u32) -> f64>, &str); 4] = [
+    let cases: [(&str, Codes, &str); 4] = [
         ("whole", Box::new(lit([7000.0; 3], 2)), ""),
         ("saturated", Box::new(lit([18_000.0, 9000.0, 7000.0], 2)), ""),
         ("listed", Box::new(lit([7000.0; 3], 2)), "--defects middle.txt"),
