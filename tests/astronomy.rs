@@ -6,47 +6,14 @@
 mod support;
 
 use std::fs;
+use support::fits::{chance, write_fits};
 use support::workshop::{BAD_DATA, Workshop};
 
 const SIZE: [u32; 2] = [384, 32];
 
-/// A FITS of the codes `of` column and row, with these cards beside those that all have.
+/// A FITS of the codes `of` column and row, by the camera A, with these cards beside.
 fn write(shop: &Workshop, name: &str, cards: &[(&str, &str)], of: impl Fn(u32, u32) -> f64) {
-    let [width, height] = SIZE.map(|side| side.to_string());
-    let always = [
-        ("SIMPLE", "T"),
-        ("BITPIX", "16"),
-        ("NAXIS", "2"),
-        ("NAXIS1", &width),
-        ("NAXIS2", &height),
-        ("BZERO", "32768"),
-        ("ROWORDER", "'TOP-DOWN'"),
-        ("BAYERPAT", "'RGGB'"),
-        ("INSTRUME", "'A'"),
-    ];
-    let cards = always.iter().chain(cards).map(|(key, value)| format!("{:<80}", format!("{key:<8}= {value}")));
-    let mut bytes: Vec<u8> = cards.chain([format!("{:<80}", "END")]).collect::<String>().into_bytes();
-    bytes.resize(bytes.len().next_multiple_of(2880), b' ');
-    for [x, y] in (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| [x, y])) {
-        #[expect(clippy::cast_possible_truncation, reason = "codes of 16 bits")]
-        let code = of(x, y).round().clamp(0.0, 65_535.0) as i64;
-        bytes.extend(i16::try_from(code - 32_768).unwrap().to_be_bytes());
-    }
-    bytes.resize(bytes.len().next_multiple_of(2880), 0);
-    fs::write(shop.path(name), bytes).unwrap();
-}
-
-/// A number between -1 and 1 of variance 1/6: the sum of two evenly spread ones.
-fn chance(x: u32, y: u32, seed: u64) -> f64 {
-    let mut state = (u64::from(x) << 32 | u64::from(y)).wrapping_add(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    let mut next = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = state;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (mixed ^ (mixed >> 31)) as f64 / 2_f64.powi(64)
-    };
-    next() - next()
+    write_fits(shop, name, SIZE, &[&[("INSTRUME", "'A'")], cards].concat(), of);
 }
 
 /// A sky that rises from `low` to `high` ADU along the rows, over a bias of 500 ADU and a read noise of 5 ADU.
@@ -188,10 +155,7 @@ fn samples_heaped_at_the_top_are_told_where_nothing_else_tells_them() {
     write(&shop, "flat.fits", &[], |x, y| sky(3000.0, 9000.0, 2)(x, y).min(8000.0));
     let line = "correct-frame light.fits --dark dark.fits --flat flat.fits --flat-dark dark.fits -o c.exr";
     let said = shop.said(line, 0);
-    assert!(
-        said.contains("photosites of the flats are at their largest value") && said.contains("--white N"),
-        "{said}"
-    );
+    assert!(said.contains("flat.fits: ") && said.contains("of its samples are at the largest value"), "{said}");
     let said = shop.said(&format!("{line} --white 8000"), 0);
     assert!(said.contains("photosites of the flats are saturated") && !said.contains("largest value"), "{said}");
     // All at the largest code of 12 bits.

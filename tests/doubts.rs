@@ -47,6 +47,15 @@ fn exposures_and_lenses_in_other_units_are_told_by_whatever_way_they_come() {
         assert!(shop.said(&line, 0).contains(wanted), "{line}");
     }
     shop.run("predict-noise --electrons 1,2,3 --f-number 180", &[]);
+    // Times of the night are set; by day they fill the sensor.
+    shop.run("predict-noise --electrons 1,2,3 --exposure 30", &[]);
+    let day = shop.said("render-radiance SAMPLES/skies/clear_zenith.csv --size 8x6 --exposure 30 -o a.exr", 0);
+    assert!(day.contains("the exposure is 30 s, and 30 ms is 0.03 s"), "{day}");
+    assert!(shop.said("measure plane.exr --exposure 40", 2).contains("exposure time in s is 0.033"));
+    fs::write(shop.path("night.raw"), vec![1; 8 * 6 * 2]).unwrap();
+    let raw = "correct-frame night.raw --raw 8x6:u16le --cfa rggb --black 0 --white 65535 -o b.exr";
+    assert_eq!(shop.said(&format!("{raw} --exposure 120"), 0), "");
+    assert!(shop.said(&format!("{raw} --exposure 33"), 0).contains(long));
     // By metadata: the sidecar of a frame that another program of ours wrote, a file that is given, and one without a history.
     fs::copy(shop.path("plane.exr.yaml"), shop.path("given.yaml")).unwrap();
     for file in ["given.yaml", "plane.exr.yaml"] {

@@ -127,7 +127,7 @@ fn corrected(plane: &MemoryFrame, darks: &[MemoryFrame], [flats, flat_darks]: [&
         let settings = DarkSettings::default();
         FlatFrames::of(&plane.header, flats.to_vec(), [flat_darks.to_vec(), Vec::new()], None, settings, None).unwrap()
     };
-    let flats = flat_frames().map(|surveyed| (flat_frames().unwrap(), surveyed.survey(None).unwrap()));
+    let flats = flat_frames().map(|surveyed| (flat_frames().unwrap(), surveyed.survey(None, None, None).unwrap()));
     stage.note_further(flats.as_ref().map(|(flats, means)| flats.record(means)), None);
     let mut corrections = Corrections { darks: dark_frames, dark_limits: None, flats, map: None, found: [0; 3] };
     let mut source = MemoryFrame::new(plane.header.clone(), plane.samples.clone());

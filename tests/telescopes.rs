@@ -7,44 +7,25 @@ mod support;
 use cyanometer::frame::Geometry;
 use cyanometer::metadata::{FrameHeader, Metadata, TakenAs};
 use std::fs;
+use support::fits::write_fits;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 const SIZE: [usize; 2] = [16, 12];
 
 /// A FITS of codes about a level, which `seed` scatters, with these cards.
-fn write_fits(shop: &Workshop, name: &str, [level, seed]: [u32; 2], cards: &[(&str, &str)]) {
-    let [width, height] = SIZE.map(|side| side.to_string());
-    let always = [
-        ("SIMPLE", "T"),
-        ("BITPIX", "16"),
-        ("NAXIS", "2"),
-        ("NAXIS1", &width),
-        ("NAXIS2", &height),
-        ("BZERO", "32768"),
-        ("ROWORDER", "'TOP-DOWN'"),
-        ("BAYERPAT", "'RGGB'"),
-    ];
-    let cards = always.iter().chain(cards).map(|(key, value)| format!("{:<80}", format!("{key:<8}= {value}")));
-    let mut bytes: Vec<u8> = cards.chain([format!("{:<80}", "END")]).collect::<String>().into_bytes();
-    bytes.resize(bytes.len().next_multiple_of(2880), b' ');
-    for place in 0..u32::try_from(SIZE[0] * SIZE[1]).unwrap() {
-        let code = level + (place * 7919 + seed * 104_729 + place * place * (seed + 3)) % 11;
-        bytes.extend(i16::try_from(i64::from(code) - 32768).unwrap().to_be_bytes());
-    }
-    bytes.resize(bytes.len().next_multiple_of(2880), 0);
-    fs::write(shop.path(name), bytes).unwrap();
+fn write(shop: &Workshop, name: &str, [level, seed]: [u32; 2], cards: &[(&str, &str)]) {
+    let [width, height] = SIZE.map(|side| u32::try_from(side).unwrap());
+    write_fits(shop, name, [width, height], cards, |x, y| {
+        let place = y * width + x;
+        f64::from(level + (place * 7919 + seed * 104_729 + place * place * (seed + 3)) % 11)
+    });
 }
 
 /// A light frame of 2 s, and a dark frame with these cards.
 fn night(dark: &[(&str, &str)]) -> Workshop {
     let shop = Workshop::new();
-    write_fits(
-        &shop,
-        "light.fits",
-        [900, 1],
-        &[("EXPTIME", "2.0"), ("IMAGETYP", "'Light Frame'"), ("INSTRUME", "'A'")],
-    );
-    write_fits(&shop, "dark.fits", [100, 2], &[&[("INSTRUME", "'A'")], dark].concat());
+    write(&shop, "light.fits", [900, 1], &[("EXPTIME", "2.0"), ("IMAGETYP", "'Light Frame'"), ("INSTRUME", "'A'")]);
+    write(&shop, "dark.fits", [100, 2], &[&[("INSTRUME", "'A'")], dark].concat());
     shop
 }
 
@@ -73,7 +54,7 @@ fn times_are_compared_where_no_aperture_is_told() {
 #[test]
 fn darks_are_scaled_by_times_alone() {
     let shop = night(&[DARK, ("EXPTIME", "8.0")]);
-    write_fits(&shop, "bias.fits", [60, 3], &[("EXPTIME", "0.0"), ("IMAGETYP", "'Bias Frame'"), ("INSTRUME", "'A'")]);
+    write(&shop, "bias.fits", [60, 3], &[("EXPTIME", "0.0"), ("IMAGETYP", "'Bias Frame'"), ("INSTRUME", "'A'")]);
     let line = "correct-frame light.fits --dark dark.fits --bias bias.fits --scale-dark -o out.exr";
     let scaled = shop.said(line, 0);
     assert!(scaled.contains("its temperature is not known"), "{scaled}");
@@ -85,8 +66,8 @@ fn darks_are_scaled_by_times_alone() {
     }
     // A time that no file tells is said, and needs no f-number.
     let shop = night(&[DARK, ("EXPTIME", "8.0")]);
-    write_fits(&shop, "light.fits", [900, 1], &[("INSTRUME", "'A'")]);
-    write_fits(&shop, "bias.fits", [60, 3], &[("INSTRUME", "'A'")]);
+    write(&shop, "light.fits", [900, 1], &[("INSTRUME", "'A'")]);
+    write(&shop, "bias.fits", [60, 3], &[("INSTRUME", "'A'")]);
     let missing = shop.said(line, BAD_DATA);
     assert!(missing.contains("`exposure_time_s`") && missing.ends_with("give --exposure S\n"), "{missing}");
     shop.said(&format!("{line} --exposure 2"), 0);
@@ -125,14 +106,14 @@ fn what_a_frame_was_taken_as_is_what_it_is_used_as() {
     let shop = night(&[DARK]);
     let flat = shop.said("correct-frame light.fits --black 50 --flat dark.fits -o out.exr", BAD_DATA);
     assert!(flat.contains("it was taken as a dark frame") && flat.contains("is given as a flat"), "{flat}");
-    write_fits(&shop, "light.fits", [900, 1], &[DARK, ("INSTRUME", "'A'")]);
+    write(&shop, "light.fits", [900, 1], &[DARK, ("INSTRUME", "'A'")]);
     assert!(dark(&shop, 0).contains("light.fits: no light fell on it: it is a dark frame itself"));
 }
 
 #[test]
 fn a_copy_of_the_frame_corrects_nothing() {
     let shop = night(&[DARK]);
-    write_fits(&shop, "copy.fits", [900, 1], &[("INSTRUME", "'A'"), ("OBSERVER", "'me'")]);
+    write(&shop, "copy.fits", [900, 1], &[("INSTRUME", "'A'"), ("OBSERVER", "'me'")]);
     for rest in ["--dark copy.fits", "--dark dark.fits --flat copy.fits --flat-dark dark.fits", "--bias copy.fits"] {
         let refused = shop.said(&format!("correct-frame light.fits {rest} -o out.exr"), BAD_DATA);
         assert!(refused.contains("copy.fits: its samples are those of light.fits, every one"), "{refused}");
@@ -149,9 +130,9 @@ fn a_dark_that_is_no_dark_is_told_by_its_level() {
     let told = shop.said(&format!("{line} -v"), 0);
     assert!(told.contains("dark.fits: the metadata do not tell whether it is a dark frame of the sensor"), "{told}");
     // One that tells no camera beside one that does is doubtful.
-    write_fits(&shop, "dark.fits", [100, 2], &[]);
+    write(&shop, "dark.fits", [100, 2], &[]);
     assert!(shop.said(line, 0).contains("warning: dark.fits: the metadata do not tell"));
-    write_fits(&shop, "dark.fits", [1000, 2], &[("INSTRUME", "'A'")]);
+    write(&shop, "dark.fits", [1000, 2], &[("INSTRUME", "'A'")]);
     let below = shop.said(line, 0);
     assert!(
         below.contains("warning: light.fits: its mean is 904.0 ADU") && below.contains("below that of what came off"),
@@ -163,7 +144,7 @@ fn a_dark_that_is_no_dark_is_told_by_its_level() {
 fn keywords_that_contradict_each_other_are_told() {
     let of = |cards: &[(&str, &str)]| {
         let shop = Workshop::new();
-        write_fits(&shop, "a.fits", [900, 1], cards);
+        write(&shop, "a.fits", [900, 1], cards);
         shop.said("measure a.fits -o out.txt", 0)
     };
     let warned = |what: &str| format!("measure: warning: a.fits: {what}\n");
@@ -223,7 +204,7 @@ fn a_black_level_above_white_leaves_nothing() {
 fn black_levels_begin_at_the_corner_of_the_picture() {
     let shop = Workshop::new();
     for offsets in [["0", "0"], ["1", "0"], ["0", "1"], ["1", "1"]] {
-        write_fits(&shop, "a.fits", [900, 1], &[("XBAYROFF", offsets[0]), ("YBAYROFF", offsets[1])]);
+        write(&shop, "a.fits", [900, 1], &[("XBAYROFF", offsets[0]), ("YBAYROFF", offsets[1])]);
         shop.said("correct-frame a.fits --black 10,20,30,40 -o out.exr", 0);
         let (before, after) = (shop.read("a.fits").0, shop.read("out.exr").0);
         for (place, (before, after)) in before.iter().zip(&after).enumerate() {
@@ -289,7 +270,7 @@ fn codes_that_another_program_scaled_are_no_codes() {
 fn units_that_are_no_codes_are_refused_unless_metadata_say_so() {
     let shop = Workshop::new();
     for unit in ["'adu/s'", "'MJy/sr'"] {
-        write_fits(&shop, "flux.fits", [900, 1], &[("BUNIT", unit), ("EXPTIME", "2.0")]);
+        write(&shop, "flux.fits", [900, 1], &[("BUNIT", unit), ("EXPTIME", "2.0")]);
         for line in ["measure flux.fits", "demosaic flux.fits --black 0 -o a.exr", "preview flux.fits -o a.png"] {
             let said = shop.said(line, BAD_DATA);
             let named = format!("its samples are in `{}` (BUNIT), and neither in ADU", unit.trim_matches('\''));
@@ -298,6 +279,6 @@ fn units_that_are_no_codes_are_refused_unless_metadata_say_so() {
     }
     fs::write(shop.path("m.yaml"), "schema: cyanometer/1\nquantity: adu\ncfa: rggb\n").unwrap();
     shop.run("demosaic flux.fits --metadata m.yaml --black 0 -o a.exr", &[]);
-    write_fits(&shop, "codes.fits", [900, 1], &[("BUNIT", "'counts'"), ("EXPTIME", "2.0")]);
+    write(&shop, "codes.fits", [900, 1], &[("BUNIT", "'counts'"), ("EXPTIME", "2.0")]);
     shop.run("demosaic codes.fits --black 0 -o a.exr", &[]);
 }

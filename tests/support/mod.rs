@@ -5,6 +5,7 @@
 
 pub mod bounds;
 pub mod dng;
+pub mod fits;
 pub mod makers;
 pub mod misses;
 pub mod photon_transfer;

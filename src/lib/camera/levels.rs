@@ -3,6 +3,17 @@
 use crate::cfa::Class;
 use serde::{Deserialize, Serialize};
 
+/// Black levels are told to a quarter: nothing of a camera reads less than this share of its bias.
+pub const LEAST_OF_BIAS: f64 = 0.75;
+
+/// The least and the largest level of no light that go with a bias, ADU, where codes end at `top`: black levels count the dark signal of
+/// their exposures, which is a few per cent of the range, or half the bias.
+pub fn levels_of_bias(bias_adu: f64, top: f64) -> [f64; 2] {
+    const MOST_OF_BIAS: f64 = 1.5;
+    const OF_RANGE: f64 = 0.03;
+    [LEAST_OF_BIAS * bias_adu, (MOST_OF_BIAS * bias_adu).max(bias_adu + OF_RANGE * (top - bias_adu))]
+}
+
 /// How many times each other levels of one scale of codes are at most: white levels are told a few per cent apart, and codes lie above
 /// them by noise and by the habits of cameras; other scales are other numbers of bits.
 pub const OF_ONE_SCALE: f64 = 1.5;

@@ -7,8 +7,17 @@ use std::f64::consts::PI;
 
 /// In air no lens has a smaller f-number.
 const LEAST_F_NUMBER: f64 = 0.5;
-/// Times from here on look like ms, s.
+/// Times from here on are those of the night, s.
 const LONG_S: f64 = 5.0;
+/// Times beyond are those of no single frame, s.
+const LONGEST_S: f64 = 3600.0;
+/// Frames per second whose times in ms, to [`SAME_TIME`], are no times that anybody sets in s: 41.7, 33.3, 16.7, 8.3 and 6.9. Others, 40, 20
+/// and 10, are set at night.
+const FRAME_RATES: [f64; 5] = [24.0, 30.0, 60.0, 120.0, 144.0];
+/// Numbers in two digits differ by no more.
+const SAME_TIME: f64 = 0.021;
+/// Denominators of shutters that are no round times in s.
+const SHUTTERS: [f64; 7] = [125.0, 160.0, 320.0, 640.0, 1250.0, 2500.0, 3200.0];
 /// F-numbers from here on are beyond pinholes, and look like thousandths of the smallest lenses have and more.
 const MOST_F_NUMBER: f64 = 1000.0 * LEAST_F_NUMBER;
 /// Focal lengths below look like m, mm: the lenses of endoscopes have longer ones.
@@ -16,9 +25,23 @@ const LEAST_FOCAL_LENGTH_MM: f64 = 0.5;
 /// Focal lengths from here on look like µm, mm.
 const MOST_FOCAL_LENGTH_MM: f64 = 10_000.0;
 
-/// A warning of an exposure time that looks as if it were in ms.
+/// Whether a time is one of the night.
+pub fn is_long(time_s: f64) -> bool {
+    time_s >= LONG_S
+}
+
+/// A warning of an exposure time that looks as if it were in ms, or the denominator of a fraction. Round times are those of the night.
 pub fn doubt_of_time(time_s: f64) -> Option<String> {
-    (time_s >= LONG_S).then(|| format!("an exposure of {time_s} s is long; {time_s} ms is {} s", time_s / 1000.0))
+    let is_near = |rate: &f64| (time_s * rate / 1000.0 - 1.0).abs() < SAME_TIME;
+    let long = || format!("an exposure of {time_s} s is long");
+    match time_s {
+        _ if !is_long(time_s) => None,
+        _ if SHUTTERS.contains(&time_s) => Some(format!("{}; 1/{time_s} s is {} s", long(), 1.0 / time_s)),
+        _ if time_s > LONGEST_S || FRAME_RATES.iter().any(is_near) => {
+            Some(format!("{}; {time_s} ms is {} s", long(), time_s / 1000.0))
+        }
+        _ => None,
+    }
 }
 
 /// A warning of an f-number that looks as if it were in thousandths.
@@ -185,6 +208,16 @@ mod tests {
                 "an f-number of 2800 is that of no lens; in thousandths it is 2.8"
             ]
         );
+        for set in [
+            0.033, 4.0, 5.0, 6.0, 8.0, 10.0, 13.0, 15.0, 20.0, 25.0, 30.0, 40.0, 60.0, 120.0, 300.0, 500.0, 1800.0,
+            3600.0,
+        ] {
+            assert_eq!(doubt_of_time(set), None, "{set}");
+        }
+        for meant in [33.0, 33.3, 16.67, 17.0, 8.33, 41.7, 6.94, 4000.0] {
+            assert!(doubt_of_time(meant).is_some_and(|doubt| doubt.contains(&format!("{meant} ms is"))), "{meant}");
+        }
+        assert_eq!(doubt_of_time(125.0).unwrap(), "an exposure of 125 s is long; 1/125 s is 0.008 s");
         let said = |length| doubt_of_focal_length(length).unwrap_or_default();
         assert_eq!(said(0.05), "a focal length of 0.05 mm is that of few lenses; 0.05 m is 50 mm");
         assert_eq!(said(50_000.0), "a focal length of 50000 mm is that of few lenses; 50000 um is 50 mm");

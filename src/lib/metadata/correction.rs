@@ -274,8 +274,11 @@ pub struct FlatRecord {
     /// Means of its classes above what no light reads, in ADU, by which it was divided: of R, G and B, of the filters of
     /// another array in the order of their letters, of the one class there is, or of planes.
     pub means_adu: Vec<f64>,
-    /// How many photosites each is the mean of.
+    /// How many photosites each is the mean of: those of cells of the array without a saturated or defective one.
     pub photosites: Vec<u64>,
+    /// Good photosites of each class beside these.
+    #[serde(default, skip_serializing_if = "is_none_left")]
+    pub left_out: Vec<u64>,
     /// Whether the metadata of all its frames say that they were lit evenly.
     pub even: bool,
     /// Exposure of the frames in s.
@@ -313,6 +316,10 @@ pub struct DefectsRecord {
     /// What they were found in.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub found_in: Vec<String>,
+}
+
+fn is_none_left(counts: &[u64]) -> bool {
+    counts.iter().all(|count| *count == 0)
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]

@@ -348,6 +348,14 @@ impl Metadata {
         unit.into_iter().chain(level).chain(time).collect()
     }
 
+    /// Takes samples of unknown quantity for codes.
+    pub fn name_codes(&mut self) {
+        if self.quantity == QuantityKind::Unspecified {
+            self.quantity = QuantityKind::Adu;
+            self.unit = QuantityKind::Adu.unit().into();
+        }
+    }
+
     /// Sets a black level that no row or column adds to.
     pub fn set_black_adu(&mut self, level: Option<BlackLevel>) {
         self.black_level_adu = level;

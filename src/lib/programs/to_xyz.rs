@@ -3,7 +3,7 @@
 use crate::analysis::characterization::CameraMatrix;
 use crate::cli;
 use crate::error::Result;
-use crate::formats::input::FrameReader;
+use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::register::{announce, check_inputs};
 use crate::requests::{Conversion, options};
 use crate::sigma::WithSigma;
@@ -56,8 +56,7 @@ fn convert(
     turn: &cli::Turn<'_>,
 ) -> Result<()> {
     let cli::Turn { session, input, output, .. } = *turn;
-    let mut reader = FrameReader::open(&input.options())?;
-    reader.tell_top();
+    let mut reader = FrameReader::open(&InputOptions { tells_top: true, ..input.options() })?;
     session.tell(&sensor.apply(&mut reader)?);
     let holds_layers = output.options().holds_layers()?;
     if let Some(mut stage) = conversion.stage_of_xyz(&mut reader, *sigma, holds_layers)? {

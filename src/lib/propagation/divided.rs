@@ -113,9 +113,9 @@ impl Photosite {
         let mean = first * scale;
         let variance = ((square - first * first) * scale * scale).max(0.0);
         // ⟨F⟩ is a mean over as many photosites, the same patterns and the same noise as A/F:
-        // cov(F, A/F) = E A − E F E[A/F].
+        // cov(F, A/F) = E A − E F E[A/F], of those that ⟨F⟩ counts.
         let of_both = 2.0 * scale * first * (above - scale * first);
-        let off = of_both + first * first * (of_flat - scale * scale);
+        let off = flat.counted_share[class] * of_both + first * first * (of_flat - scale * scale);
         let prediction = Prediction::of_cumulants(mean, variance, third * scale.powi(3), 0.0);
         let (anew, unlike) = unlike.found();
         let unlike = Unlike { spread: unlike.spread + of_flat_noise / weight, of_means: None, ..unlike };

@@ -168,6 +168,8 @@ pub struct Flat {
     pub expected_e: [f64; 3],
     /// Photosites over which each was normalized.
     pub photosites: [f64; 3],
+    /// The share of good photosites that these are.
+    pub counted_share: [f64; 3],
     /// The frames themselves: the noise of each, and how they were averaged.
     pub frames: Dark,
     /// What came off them first.
@@ -239,6 +241,8 @@ impl Flat {
             _ => None,
         };
         let photosites: Vec<f64> = record.photosites.iter().map(|count| *count as f64).collect();
+        let left_out = record.left_out.iter().map(|count| *count as f64).chain(std::iter::repeat(0.0));
+        let counted: Vec<f64> = photosites.iter().zip(left_out).map(|(n, left)| n / (n + left).max(1.0)).collect();
         let darks = Dark::all(frame, &record.masters, of_sensor)?;
         let level_adu = record.black_adu.map_or(0.0, |black| black - adc.bias_adu);
         // What dark signal is left in the means is no light.
@@ -249,6 +253,7 @@ impl Flat {
         Some(Self {
             expected_e: three(&record.means_adu)?.map(light_e),
             photosites: three(&photosites)?,
+            counted_share: three(&counted)?,
             frames: Dark { weight: 1.0, is_bias: false, model, frames, combine, clip: clip.unwrap_or(CLIP) },
             darks,
             shares_masters: record.shares_masters,

@@ -1,7 +1,10 @@
 //! Corrections of a frame of codes before demosaicking.
 
 use super::border::measure_black;
-use super::dark_levels::{doubt_of_level, doubt_of_low, doubt_of_misfit, doubt_of_scale, least_level, range_of};
+use super::dark_levels::{
+    doubt_of_border, doubt_of_dark, doubt_of_high, doubt_of_level, doubt_of_low, doubt_of_misfit, doubt_of_one,
+    doubt_of_scale, least_level, most_level, range_of,
+};
 use super::described::{Described, doubt_of_black};
 use super::independence::{Company, Role, check_contents, check_files};
 use super::notes::Note;
@@ -10,11 +13,11 @@ use super::values::{self, BlackChoice};
 use crate::camera::levels::{BlackLevel, BlackLevels};
 use crate::error::{Error, Result};
 use crate::formats::files::read_file;
-use crate::formats::input::{FrameReader, InputOptions, Linearizing};
+use crate::formats::input::{FrameReader, InputOptions, Linearizing, OfCamera};
 use crate::formats::many::OneOfMany;
 use crate::formats::register::check_inputs;
 use crate::masking::Corrections;
-use crate::metadata::{DefectsRecord, FlatRecord, FrameHeader, Scene, TakenAs};
+use crate::metadata::{DefectsRecord, FlatRecord, FrameHeader};
 use crate::numerics::averages::{CLIP, Combine};
 use crate::stages::black::Black;
 use crate::stages::correct::{CorrectFrame, CorrectionSettings};
@@ -101,6 +104,8 @@ pub struct OpenCorrection {
     range_adu: Option<[f64; 2]>,
     /// What the mean of dark frames is at least.
     least_adu: Option<f64>,
+    /// What it can well be at most, and what tells it.
+    most_adu: Option<(f64, &'static str)>,
     /// The black level of a camera's frame whose dark signal no sensor tells.
     black_adu: Option<f64>,
 }
@@ -150,12 +155,15 @@ impl Correction {
         let lists = [&self.dark, &self.bias, &self.flat, &self.flat_dark];
         let once = lists.into_iter().flatten().chain(&self.defects).map(PathBuf::as_path);
         check_inputs(once.map(Some).chain([input.path()]))?;
-        let of_flats =
-            [&self.flat, &self.flat_dark, &self.bias].into_iter().flatten().filter(|_| !self.flat.is_empty());
+        let of_flats = [&self.flat, &self.flat_dark, &self.bias]
+            .into_iter()
+            .flatten()
+            .chain(&self.defects)
+            .filter(|_| !self.flat.is_empty());
         let for_defects = self.dark.iter().chain(&self.bias).filter(|_| self.find_defects.is_some());
         if of_flats.chain(for_defects).any(|path| path.as_os_str() == "-") {
             return Err(Error::Usage(
-                "flats, and frames in which defects are found, are read twice; name files".into(),
+                "flats, and frames in which defects are found, are read twice, and a map of defects with flats; name files".into(),
             ));
         }
         if self.find_defects.is_some() && self.dark.is_empty() && self.bias.is_empty() && self.flat.is_empty() {
@@ -208,16 +216,21 @@ impl Correction {
         2 * (self.dark.len() + 2 * self.bias.len() + self.flat.len() + self.flat_dark.len()) + 2
     }
 
-    /// Opens frames beside the input.
-    fn open_frames(&self, paths: &[PathBuf], input: &Input, linearize: &Linearizing) -> Result<Vec<OneOfMany>> {
-        let beside = |path: &PathBuf| InputOptions { linearize: linearize.clone(), ..input.beside(path) };
+    /// Opens frames beside the input, as `how` has it.
+    fn open_frames(&self, paths: &[PathBuf], light: &Light, how: &InputOptions) -> Result<Vec<OneOfMany>> {
+        let camera = OfCamera { description: light.input.metadata.clone(), ..light.described.of_camera()? };
+        let beside = |path: &PathBuf| InputOptions {
+            linearize: how.linearize.clone(),
+            tells_top: how.tells_top,
+            camera: camera.clone(),
+            ..light.input.beside(path)
+        };
         let options: Vec<InputOptions> = paths.iter().map(beside).collect();
         let others = self.files() - paths.len();
         OneOfMany::open_all(options, others)
     }
 
-    /// Opens frames of a kind, which join `company`; those that do not say their array or white level have what is said of
-    /// the frame.
+    /// Opens frames of a kind, which join `company`; those that do not say of their camera what is said of that of the frame have this.
     fn frames(&self, role: Role, light: &Light, company: &mut Company) -> Result<Vec<OneOfMany>> {
         let paths = match role {
             Role::Light | Role::Exposure => return Ok(Vec::new()),
@@ -226,10 +239,13 @@ impl Correction {
             Role::Flat => &self.flat,
             Role::FlatDark => &self.flat_dark,
         };
-        let mut frames = self.open_frames(paths, light.input, &self.linearizing(light.frame))?;
-        for frame in &mut frames {
-            light.described.apply_beside(frame.header_mut())?;
-        }
+        let how = InputOptions {
+            linearize: self.linearizing(light.frame),
+            // The full well of a sensor that is named counts for flats too.
+            tells_top: role == Role::Flat && light.frame.metadata.sensor.is_none(),
+            ..InputOptions::default()
+        };
+        let frames = self.open_frames(paths, light, &how)?;
         company.add(role, frames.iter().map(OneOfMany::header));
         Ok(frames)
     }
@@ -274,17 +290,28 @@ impl Correction {
         })
     }
 
-    fn map(&self, frame: &FrameHeader, input: &Input) -> Result<Option<DefectMap<OneOfMany>>> {
+    /// Reads flats for the means of their classes; where defects are looked for twice, so that what is found does not count.
+    fn flat_means(&self, light: &Light, flats: FlatFrames<OneOfMany>, beyond: Option<f64>) -> Result<FlatMeans> {
+        let map = || self.map(light);
+        let found = flats.survey(beyond, map()?, None)?;
+        let Some(limits) = found.limits() else { return Ok(found) };
+        match self.flats(light, &mut Company::default())? {
+            Some(flats) => Ok(flats.survey(None, map()?, Some(limits))?.within(limits)),
+            None => Ok(found),
+        }
+    }
+
+    fn map(&self, light: &Light) -> Result<Option<DefectMap<OneOfMany>>> {
         let Some(path) = &self.defects else { return Ok(None) };
         let is_list =
             path.extension().is_some_and(|end| ["txt", "csv"].iter().any(|list| end.eq_ignore_ascii_case(list)));
         if !is_list {
-            let mut map = self.open_frames(std::slice::from_ref(path), input, &Linearizing::No)?;
-            return map.pop().map(|map| DefectMap::of_frame(map, frame)).transpose();
+            let mut map = self.open_frames(std::slice::from_ref(path), light, &InputOptions::default())?;
+            return map.pop().map(|map| DefectMap::of_frame(map, light.frame)).transpose();
         }
         let (bytes, name) = (read_file(path)?, path.display().to_string());
         let text = String::from_utf8(bytes).map_err(|_| Error::format(&name, "it is no text"))?;
-        DefectMap::of_list(&text, &name, frame).map(Some)
+        DefectMap::of_list(&text, &name, light.frame).map(Some)
     }
 
     /// Opens what `frame` is corrected by, and reads flats, and frames in which defects are found, for what they are on the
@@ -325,14 +352,14 @@ impl Correction {
         };
         let flats = match flats {
             Some(flats) => {
-                let means = flats.survey(beyond)?;
+                let means = self.flat_means(light, flats, beyond)?;
                 self.flats(light, again)?.map(|flats| (flats, means))
             }
             None => None,
         };
         if let Some((flats, means)) = &flats {
             warnings.extend_from_slice(flats.warnings());
-            warnings.extend(doubts_of_flats(means));
+            warnings.extend(doubt_of_flats(means));
         }
         warnings.extend(beyond.and_then(doubt_of_limits));
         let sources =
@@ -343,6 +370,7 @@ impl Correction {
         remarks.extend(on_trust.clone().filter(|text| !warnings.contains(text)));
         let range_adu = on_trust.and_then(|_| range_of(frame));
         let least_adu = least_level(frame, darks.as_ref().is_some_and(|darks| darks.stack().is_bias()));
+        let most_adu = darks.as_ref().and_then(|darks| most_level(frame, darks.stack()));
         let defects = self.defects_record(beyond, dark_limits.as_ref(), flats.is_some());
         let shares_masters = company.shares_darks().unwrap_or_else(|| {
             let problem =
@@ -352,13 +380,13 @@ impl Correction {
         });
         let of_flats = flats.as_ref().map(|(flats, means)| FlatRecord { shares_masters, ..flats.record(means) });
         stage.note_further(of_flats, defects);
-        let map = self.map(frame, input)?;
+        let map = self.map(light)?;
         let list = self.defects.as_deref().map(|path| path.display().to_string()).unwrap_or_default();
         warnings.extend(map.as_ref().and_then(|map| map.doubt(&list, frame)));
         notes.extend(warnings.into_iter().map(Note::Warning).chain(remarks.into_iter().map(Note::Remark)));
         let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
         let black_adu = frame.metadata.black_level_adu.filter(|_| frame.metadata.adc.is_none()).map(BlackLevel::mean);
-        Ok(OpenCorrection { stage, corrections, notes, range_adu, least_adu, black_adu })
+        Ok(OpenCorrection { stage, corrections, notes, range_adu, least_adu, most_adu, black_adu })
     }
 
     /// Makes sure that no frame beside `light` is a copy of it, or of another.
@@ -414,34 +442,12 @@ fn doubt_of_limits(beyond: f64) -> Option<String> {
     })
 }
 
-/// Warnings of flats that are saturated, or look so.
-fn doubts_of_flats(means: &FlatMeans) -> impl Iterator<Item = String> {
-    let full = (means.full > 0).then(|| {
+/// A warning of flats that are saturated.
+fn doubt_of_flats(means: &FlatMeans) -> Option<String> {
+    (means.full > 0).then(|| {
         format!(
-            "{} photosites of the flats are saturated; they are marked, and the mean by which the others of their class are divided \
-             counts them at less than they had",
+            "{} photosites of the flats are saturated; they are marked, and the means of all classes are those of places where none is",
             means.full
-        )
-    });
-    let heaped = (means.heaped > 0).then(|| {
-        format!(
-            "{} photosites of the flats are at their largest value, as saturated ones are, and no white level tells that they are; give \
-             --white N",
-            means.heaped
-        )
-    });
-    full.into_iter().chain(heaped)
-}
-
-/// A warning of a frame that dark frames come off and that is one itself: a shell gives `--dark` the first of several names.
-fn doubt_of_dark(frame: &FrameHeader) -> Option<String> {
-    let is_unlit = frame.metadata.scene.as_ref().is_some_and(Scene::is_dark)
-        || matches!(frame.metadata.taken_as, Some(TakenAs::Dark | TakenAs::Bias));
-    is_unlit.then(|| {
-        format!(
-            "{}: no light fell on it: it is a dark frame itself; to take several names for --dark put them in quotes, \
-             --dark 'dark-*.exr'",
-            frame.name
         )
     })
 }
@@ -472,7 +478,13 @@ impl OpenCorrection {
         let level = low.or_else(|| means.and_then(|means| doubt_of_level(name, means, self.range_adu)));
         let misfit = || darks.as_ref().and_then(DarkFrames::misfit).map(|misfit| doubt_of_misfit(name, misfit));
         let scale = || means.and_then(|[_, dark]| doubt_of_scale(name, dark, self.black_adu));
-        let level = level.or_else(misfit).or_else(scale);
+        let high = || means.zip(self.most_adu).and_then(|([_, dark], most)| doubt_of_high(name, dark, most));
+        let border =
+            || darks.as_ref().and_then(DarkFrames::left_at_border).and_then(|left| doubt_of_border(name, left));
+        let level = level.or_else(misfit).or_else(scale).or_else(high).or_else(border);
+        let unlike = darks.as_ref().and_then(DarkFrames::unlike);
+        let of_flats = flats.as_ref().and_then(|(flats, _)| flats.unlike_dark());
+        let level = level.into_iter().chain(unlike.into_iter().chain(of_flats).map(doubt_of_one));
         let doubt = map.as_ref().and_then(DefectMap::finding).into_iter().chain(level).map(Note::Warning);
         said.into_iter().flatten().map(Note::Remark).chain(doubt).collect()
     }

@@ -1,8 +1,9 @@
 //! What came off a frame and cannot well be its dark signal, by its mean.
 
-use crate::metadata::FrameHeader;
+use crate::camera::levels::LEAST_OF_BIAS;
+use crate::metadata::{FrameHeader, Scene, TakenAs};
 use crate::stages::bounds::Bounds;
-use crate::stages::darks::{DRIFT, Misfit};
+use crate::stages::darks::{DRIFT, DarkStack, Misfit};
 
 /// Black and white level of a frame, where both are known.
 pub(super) fn range_of(frame: &FrameHeader) -> Option<[f64; 2]> {
@@ -31,12 +32,23 @@ pub(super) fn doubt_of_level(name: &str, [frame, dark]: [f64; 2], range_adu: Opt
     })
 }
 
+/// A warning of a frame that dark frames come off and that is one itself: a shell gives `--dark` the first of several names.
+pub(super) fn doubt_of_dark(frame: &FrameHeader) -> Option<String> {
+    let is_unlit = frame.metadata.scene.as_ref().is_some_and(Scene::is_dark)
+        || matches!(frame.metadata.taken_as, Some(TakenAs::Dark | TakenAs::Bias));
+    is_unlit.then(|| {
+        format!(
+            "{}: no light fell on it: it is a dark frame itself; to take several names for --dark put them in quotes, \
+             --dark 'dark-*.exr'",
+            frame.name
+        )
+    })
+}
+
 /// What the mean of frames without light is at least, bias frames where `is_bias`: the bias less what noise takes, or, of cameras whose
 /// noise is not known, a share of the bias of the sensor that is named, or else of the black level. That may count the dark signal of the
 /// exposure, which bias frames lack.
 pub(super) fn least_level(frame: &FrameHeader, is_bias: bool) -> Option<f64> {
-    /// Black levels are told to a few per cent.
-    const MOST_OF_BLACK: f64 = 0.75;
     /// So many times the bias may a black level be that counts dark signal.
     const MOST_OF_BIAS: f64 = 10.0;
     let by_converter = Bounds::of(frame).and_then(|bounds| bounds.mean);
@@ -44,12 +56,73 @@ pub(super) fn least_level(frame: &FrameHeader, is_bias: bool) -> Option<f64> {
     let share = || {
         let black = metadata.black_level_adu.map(|black| black.sites().into_iter().fold(f64::INFINITY, f64::min));
         match metadata.bias_adu().filter(|_| is_bias) {
-            Some(bias) => Some(MOST_OF_BLACK * bias),
+            Some(bias) => Some(LEAST_OF_BIAS * bias),
             None if is_bias => black.map(|black| black / MOST_OF_BIAS),
-            None => black.or(metadata.bias_adu()).map(|level| MOST_OF_BLACK * level),
+            None => black.or(metadata.bias_adu()).map(|level| LEAST_OF_BIAS * level),
         }
     };
     by_converter.or_else(|| share().filter(|least| *least > 0.0 && metadata.adc.is_none()))
+}
+
+/// What the mean of dark frames of a frame can well be at most, ADU, and what tells it: the bias of its sensor and ten times the dark
+/// signal, as sensors of one model and temperatures that nobody told differ; or its black level, where no time is left for dark signal.
+pub(super) fn most_level(frame: &FrameHeader, darks: &DarkStack) -> Option<(f64, &'static str)> {
+    /// Levels are told to such a share, and to so many ADU.
+    const NEAR: [f64; 2] = [0.02, 4.0];
+    /// The same of black levels of cameras.
+    const NEAR_BLACK: [f64; 2] = [0.05, 8.0];
+    const TIMES: f64 = 10.0;
+    /// Exposures in which no camera collects a dark signal that shows, s.
+    const SHORT_S: f64 = 0.1;
+    let metadata = &frame.metadata;
+    let off = |level: f64, near: [f64; 2]| level + (near[0] * level.abs()).max(near[1]);
+    if let Some(readout) = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref()) {
+        let own = (metadata.time_s(), metadata.temperature_k());
+        let masters = darks.masters();
+        let of_masters = masters.iter().map(|master| (master.exposure_s.or(own.0), master.temperature_k.or(own.1)));
+        let dark_e = |(time_s, temperature_k): (Option<f64>, Option<f64>)| {
+            let charges = readout.dark_charges_e(temperature_k.unwrap_or(readout.temperature_k), time_s)?;
+            Some(charges[0] + readout.hot_pixel_share * charges[1])
+        };
+        let doses = std::iter::once(own).chain(of_masters).map(dark_e);
+        let most_e =
+            if darks.is_bias() { 0.0 } else { doses.into_iter().try_fold(0.0, |most: f64, e| Some(most.max(e?)))? };
+        let slope = metadata.adu_per_e().unwrap_or(readout.adu_per_e);
+        let bias = metadata.bias_adu().unwrap_or(readout.bias_adu);
+        return Some((off(bias, NEAR) + TIMES * slope * most_e, "sensor"));
+    }
+    let is_short = darks.is_bias() || metadata.time_s().is_some_and(|time_s| time_s <= SHORT_S);
+    let black = metadata.black_level_adu.filter(|_| is_short)?;
+    Some((off(black.largest(), NEAR_BLACK), "black level"))
+}
+
+/// A warning of what came off a frame and lies above what dark frames of it read.
+pub(super) fn doubt_of_high(name: &str, dark: f64, (most, by): (f64, &str)) -> Option<String> {
+    (dark > most).then(|| {
+        format!(
+            "{name}: what came off has a mean of {dark:.1} ADU, and by the frame's {by} dark frames have {most:.1} ADU at most; did light fall \
+             on them, or was their level shifted?"
+        )
+    })
+}
+
+/// A warning of frames that count as one, one of which is at another level than the others.
+pub(super) fn doubt_of_one((name, [mean, median]): (&str, [f64; 2])) -> String {
+    format!(
+        "{name}: its mean is {mean:.1} ADU, and that of the frames which it counts as one with {median:.1} ADU; was it lit, or its level shifted?"
+    )
+}
+
+/// A warning of what is left of photosites that no light reaches.
+pub(super) fn doubt_of_border(name: &str, [left, deviation]: [f64; 2]) -> Option<String> {
+    /// Black levels drift by less from frame to frame, ADU.
+    const DRIFT_ADU: f64 = 4.0;
+    const Z: f64 = 8.0;
+    (left.abs() > DRIFT_ADU + Z * deviation).then(|| {
+        format!(
+            "{name}: {left:.1} ADU are left of its masked photosites by what came off; is that of another exposure or level, or was it lit?"
+        )
+    })
 }
 
 /// A warning of what came off a frame whose bias it does not reach.

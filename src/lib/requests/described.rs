@@ -3,13 +3,13 @@
 use super::notes::Note;
 use super::options::Input;
 use super::values;
-use crate::camera::levels::{BlackLevel, BlackLevels};
+use crate::camera::levels::{BlackLevel, BlackLevels, levels_of_bias};
 use crate::camera::optics::{Exposure, doubt_of_aperture, doubt_of_time};
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
-use crate::formats::input::{FrameReader, InputOptions};
+use crate::formats::input::{FrameReader, InputOptions, OfCamera};
 use crate::formats::register;
-use crate::metadata::{CorrectionRecord, FrameHeader, Metadata};
+use crate::metadata::{CorrectionRecord, FrameHeader};
 use crate::stages::black::Black;
 use crate::units::QuantityKind;
 use clap::Args;
@@ -105,8 +105,7 @@ impl Described {
     ///
     /// Those of [`FrameReader::open`] and [`Self::apply`].
     pub fn open(&self, options: &InputOptions) -> Result<FrameReader> {
-        let mut reader = FrameReader::open(options)?;
-        reader.tell_top();
+        let mut reader = FrameReader::open(&InputOptions { tells_top: true, ..options.clone() })?;
         self.apply(reader.header_mut())?;
         Ok(reader)
     }
@@ -133,7 +132,7 @@ impl Described {
             let known = frame.metadata.cfa.filter(|known| *known != cfa);
             agree(frame, "filter array", known.map(|known| known.to_string()), option)?;
             frame.metadata.cfa = Some(cfa);
-            as_codes(&mut frame.metadata);
+            frame.metadata.name_codes();
         }
         if let Some(white) = self.white_level_adu {
             check_codes(frame, &["white"])?;
@@ -279,8 +278,6 @@ pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>>
 /// A warning of a level to subtract from codes of a camera that is far from the bias of the sensor which is named; what it counts of dark
 /// signal is a small share of the range.
 fn of_another_sensor(frame: &FrameHeader, black: BlackLevel) -> Option<Note> {
-    const NEAR: [f64; 2] = [0.75, 1.5];
-    const OF_RANGE: f64 = 0.03;
     let metadata = &frame.metadata;
     let are_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
     if !are_codes || metadata.adc.is_some() || metadata.black_level_adu.is_some() || metadata.correction.is_some() {
@@ -289,8 +286,8 @@ fn of_another_sensor(frame: &FrameHeader, black: BlackLevel) -> Option<Note> {
     let sensor = metadata.sensor.as_ref()?;
     let readout = sensor.readout.as_ref()?;
     let (level, bias) = (black.mean(), readout.bias_adu);
-    let most = (NEAR[1] * bias).max(bias + OF_RANGE * (f64::from((1_u32 << readout.bits) - 1) - bias));
-    (level < NEAR[0] * bias || level > most).then(|| {
+    let [least, most] = levels_of_bias(bias, f64::from((1_u32 << readout.bits) - 1));
+    (level < least || level > most).then(|| {
         Note::Warning(format!(
             "{}: --black {} is far from the bias of {}, {bias} ADU",
             frame.name,
@@ -325,21 +322,13 @@ fn other_black(frame: &FrameHeader, black: BlackLevel) -> Option<Note> {
 }
 
 impl Described {
-    /// Puts the array and the white level that are said of a frame into the metadata of one beside it, of the same camera,
-    /// where they do not say.
+    /// What is said of the camera, and counts for frames beside that do not say it.
     ///
     /// # Errors
     ///
-    /// As [`Self::apply`].
-    pub fn apply_beside(&self, frame: &mut FrameHeader) -> Result<()> {
-        let (metadata, is_plane) = (&frame.metadata, frame.geometry.channels.len() == 1);
-        let are_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
-        let said = Self {
-            cfa: self.cfa.or(self.pattern).filter(|_| metadata.cfa.is_none() && is_plane),
-            white_level_adu: self.white_level_adu.filter(|_| metadata.white_level_adu.is_none() && are_codes),
-            ..Self::default()
-        };
-        said.apply(frame)
+    /// Those of [`either`].
+    pub fn of_camera(&self) -> Result<OfCamera> {
+        Ok(OfCamera { cfa: either(self.cfa, self.pattern)?, white_level_adu: self.white_level_adu, description: None })
     }
 }
 
@@ -350,8 +339,7 @@ impl DescribedWithBlack {
     ///
     /// Those of [`FrameReader::open`] and [`Self::apply`].
     pub fn open(&self, options: &InputOptions) -> Result<FrameReader> {
-        let mut reader = FrameReader::open(options)?;
-        reader.tell_top();
+        let mut reader = FrameReader::open(&InputOptions { tells_top: true, ..options.clone() })?;
         self.apply(reader.header_mut())?;
         Ok(reader)
     }
@@ -397,17 +385,9 @@ fn other_than(said: Option<f64>, known: Option<f64>) -> Option<String> {
     known.filter(differs).map(|known| known.to_string())
 }
 
-/// Takes samples of unknown quantity for codes.
-fn as_codes(metadata: &mut Metadata) {
-    if metadata.quantity == QuantityKind::Unspecified {
-        metadata.quantity = QuantityKind::Adu;
-        metadata.unit = QuantityKind::Adu.unit().into();
-    }
-}
-
 /// Makes sure that a frame is one of ADU, of which a level is said by `option`.
 fn check_codes(frame: &mut FrameHeader, option: &'static [&'static str]) -> Result<()> {
-    as_codes(&mut frame.metadata);
+    frame.metadata.name_codes();
     if frame.metadata.quantity == QuantityKind::Adu {
         return Ok(());
     }
@@ -433,6 +413,7 @@ fn in_words(levels: &[f64]) -> String {
 mod tests {
     use super::*;
     use crate::frame::Geometry;
+    use crate::metadata::Metadata;
 
     fn frame(quantity: QuantityKind, channels: &[&str]) -> FrameHeader {
         let geometry = Geometry::new(4, 4, channels);

@@ -117,7 +117,12 @@ impl<S: RowSource> DefectMap<S> {
     }
 
     /// Marks the photosites of the rows from `first` on in the last channel of `samples`.
-    fn mark(&mut self, [first, rows, width]: [usize; 3], samples: &mut [f32], buffer: &mut Vec<f32>) -> Result<()> {
+    pub(super) fn mark(
+        &mut self,
+        [first, rows, width]: [usize; 3],
+        samples: &mut [f32],
+        buffer: &mut Vec<f32>,
+    ) -> Result<()> {
         let row_samples = samples.len() / rows.max(1);
         match self {
             Self::Frame(map, marked) => {

@@ -2,20 +2,22 @@
 //!
 //! x / g,  g = F / ⟨F⟩,  F = M − D
 //!
-//! M is an average of frames that were lit evenly, D what no light reads in them, ⟨F⟩ the mean over the photosites of a class.
+//! M is an average of frames that were lit evenly, D what no light reads in them, ⟨F⟩ the mean over the photosites of a class, where all
+//! classes are whole: of cells of the filter array none of whose photosites is saturated or defective. So the means of all classes are of the
+//! same places, and light that falls off towards the corners is the same share of each.
 
 use crate::camera::levels::BlackLevels;
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, MasterNoise, Scene};
-use crate::numerics::largest::Largest;
 use crate::stages::darks::{DarkFrames, DarkSettings, check_alike, check_codes, check_setting};
-use crate::stages::defects::{Survey, add};
+use crate::stages::defects::{DefectMap, Survey, add};
 use crate::stages::masters::Frames;
 use crate::stages::saturation::{DEFECTIVE, FullLevels, SATURATED};
 use crate::stages::sites::SiteClasses;
 use crate::stages::transfer::{Passage, Transfer};
 use crate::stream::RowSource;
+use std::ops::Range;
 
 /// What no light reads in flats.
 #[derive(Debug)]
@@ -44,15 +46,46 @@ pub struct FlatFrames<S> {
 /// What a first reading of flats tells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlatMeans {
-    /// Mean of each class above what no light reads, ADU.
+    /// Mean of each class above what no light reads, where all classes are whole, ADU.
     means: Vec<f64>,
+    /// How many photosites of each class these are the means of, and how many good ones beside them.
     photosites: Vec<u64>,
+    left_out: Vec<u64>,
     /// Photosites that are saturated in a flat.
     pub full: u64,
-    /// Photosites at one largest value, as saturated ones are, where no level tells whether they are.
-    pub heaped: u64,
-    /// Ordinary values of g, by class.
+    /// Ordinary values of F by class, ADU.
     limits: Option<Vec<[f64; 2]>>,
+}
+
+impl FlatMeans {
+    /// Ordinary values of F by class, ADU, where defects are looked for.
+    pub fn limits(&self) -> Option<&[[f64; 2]]> {
+        self.limits.as_deref()
+    }
+
+    /// The same with ordinary values of F, ADU by class, beyond which photosites are defective.
+    pub fn within(self, limits: &[[f64; 2]]) -> Self {
+        Self { limits: Some(limits.to_vec()), ..self }
+    }
+}
+
+/// Sums over the photosites of classes.
+struct Tally {
+    sums: Vec<f64>,
+    counts: Vec<u64>,
+    /// Photosites that are neither saturated nor defective, in whole cells and beside them.
+    good: Vec<u64>,
+    full: Vec<u64>,
+    lit: Vec<u64>,
+    /// Whether each cell of a row of cells is whole.
+    whole: Vec<bool>,
+}
+
+impl Tally {
+    fn new(classes: usize) -> Self {
+        let none = || vec![0; classes];
+        Self { sums: vec![0.0; classes], counts: none(), good: none(), full: none(), lit: none(), whole: Vec::new() }
+    }
 }
 
 impl<S: RowSource> FlatFrames<S> {
@@ -141,6 +174,11 @@ impl<S: RowSource> FlatFrames<S> {
         self.frames.frames().chain(darks.into_iter().flat_map(DarkFrames::frames))
     }
 
+    /// A frame among what comes off them whose mean is another than that of those which it counts as one with.
+    pub fn unlike_dark(&self) -> Option<(&str, [f64; 2])> {
+        if let Pedestal::Frames(darks) = &self.pedestal { darks.unlike() } else { None }
+    }
+
     /// Samples of theirs that were clipped so far.
     pub fn clipped(&self) -> u64 {
         let of_darks = if let Pedestal::Frames(darks) = &self.pedestal { darks.clipped() } else { 0 };
@@ -174,60 +212,131 @@ impl<S: RowSource> FlatFrames<S> {
         Ok(())
     }
 
-    /// Reads all rows for the means of the classes and, for defects beyond so many standard deviations, what is ordinary.
+    /// Reads all rows for the means of the classes and, for defects beyond so many standard deviations, what is ordinary; photosites of
+    /// `map`, and those beyond `limits`, ADU by class, are defective.
     ///
     /// # Errors
     ///
-    /// Those of the frames; [`Error::Format`](crate::error::Error::Format) for a class that is not lit, or saturated for the most part.
-    pub fn survey(mut self, beyond: Option<f64>) -> Result<FlatMeans> {
+    /// Those of the frames; [`Error::Format`](crate::error::Error::Format) for a class that is not lit, or saturated for the most part,
+    /// and where no cell is whole.
+    pub fn survey(
+        mut self,
+        beyond: Option<f64>,
+        mut map: Option<DefectMap<S>>,
+        limits: Option<&[[f64; 2]]>,
+    ) -> Result<FlatMeans> {
         let geometry = self.head.geometry.clone();
-        let (width, planes, classes) = (geometry.width, geometry.channels.len(), self.classes.count());
-        let mut sums = vec![0.0; classes];
-        let (mut counts, mut full) = (vec![0_u64; classes], vec![0_u64; classes]);
-        let mut largest_of = vec![Largest::default(); classes];
+        let width = geometry.width;
+        let classes = self.classes.count();
+        let mut tally = Tally::new(classes);
         let mut survey = beyond.map(|_| Survey::new(classes, width * geometry.height));
-        let step = geometry.cached_rows();
+        let rows_of_cell = self.cell()[1];
+        let step = geometry.cached_rows().next_multiple_of(rows_of_cell);
+        let (mut marks, mut buffer) = (Vec::new(), Vec::new());
         while self.rows_made < geometry.height {
             let first = self.rows_made;
-            self.next(step.min(geometry.height - first))?;
-            for (index, line) in self.made.chunks_exact(width).enumerate() {
-                let (y, plane) = (first + index / planes, index % planes);
-                let of_row = self.classes.row(y, plane);
-                let largest = &self.frames.largest()[index * width..][..width];
-                for (x, (flat, largest)) in line.iter().zip(largest).enumerate() {
-                    let class = of_row[x % of_row.len()];
-                    if flat.is_finite() {
-                        sums[class] += flat;
-                        counts[class] += 1;
-                        largest_of[class].take(std::iter::once(largest));
-                        full[class] += u64::from(is_full(self.full, x, y, plane, *largest));
-                    }
-                    if let Some(survey) = &mut survey {
-                        survey.take(class, *flat);
-                    }
+            let rows = step.min(geometry.height - first);
+            self.next(rows)?;
+            marks.clear();
+            marks.resize(rows * width, 0.0);
+            map.as_mut().map_or(Ok(()), |map| map.mark([first, rows, width], &mut marks, &mut buffer))?;
+            for from in (0..rows).step_by(rows_of_cell) {
+                self.take_cells(first, from..rows.min(from + rows_of_cell), &marks, limits, &mut tally);
+            }
+            if let Some(survey) = &mut survey {
+                self.take_ordinary(first, survey);
+            }
+        }
+        let limits = survey.zip(beyond).map(|(survey, beyond)| survey.limits(beyond, 1e-6));
+        self.judged(&tally, limits)
+    }
+
+    /// Columns and rows of a cell of the array, or of the frame where that is smaller.
+    fn cell(&self) -> [usize; 2] {
+        let ([columns, rows], geometry) = (self.classes.period(), &self.head.geometry);
+        [columns.min(geometry.width), rows.min(geometry.height)].map(|side| side.max(1))
+    }
+
+    /// Takes in the rows `rows` of a band that begins at row `first`: a row of cells, or what is left of one at the end.
+    fn take_cells(
+        &self,
+        first: usize,
+        rows: Range<usize>,
+        marks: &[f32],
+        limits: Option<&[[f64; 2]]>,
+        tally: &mut Tally,
+    ) {
+        let (width, planes) = (self.head.geometry.width, self.head.geometry.channels.len());
+        let [columns, rows_of_cell] = self.cell();
+        let cells = if rows.len() == rows_of_cell { width / columns } else { 0 };
+        tally.whole.clear();
+        tally.whole.resize(cells, true);
+        let lines = rows.flat_map(|row| (0..planes).map(move |plane| (row, plane)));
+        for (row, plane) in lines.clone() {
+            let (from, y) = ((row * planes + plane) * width, first + row);
+            let of_row = self.classes.row(y, plane);
+            let (flats, largest) = (&self.made[from..][..width], &self.frames.largest()[from..][..width]);
+            for (x, (flat, largest)) in flats.iter().zip(largest).enumerate() {
+                let class = of_row[x % of_row.len()];
+                let is_full = is_full(self.full, x, y, plane, *largest);
+                let is_ordinary = limits.is_none_or(|limits| (limits[class][0]..=limits[class][1]).contains(flat));
+                let is_good = flat.is_finite() && !is_full && is_ordinary && marks[row * width + x] == 0.0;
+                tally.lit[class] += u64::from(flat.is_finite());
+                tally.full[class] += u64::from(flat.is_finite() && is_full);
+                tally.good[class] += u64::from(is_good);
+                if let Some(whole) = tally.whole.get_mut(x / columns) {
+                    *whole &= is_good;
                 }
             }
         }
-        let means: Vec<f64> = sums.iter().zip(&counts).map(|(sum, count)| sum / *count as f64).collect();
-        for class in 0..classes {
+        for (row, plane) in lines {
+            let of_row = self.classes.row(first + row, plane);
+            let flats = self.made[(row * planes + plane) * width..][..width].chunks_exact(columns);
+            for (cell, flats) in flats.enumerate().filter(|(cell, _)| tally.whole.get(*cell) == Some(&true)) {
+                for (x, flat) in flats.iter().enumerate() {
+                    let class = of_row[(cell * columns + x) % of_row.len()];
+                    tally.sums[class] += flat;
+                    tally.counts[class] += 1;
+                }
+            }
+        }
+    }
+
+    /// Takes in all rows of a band that begins at row `first` for what is ordinary.
+    fn take_ordinary(&self, first: usize, survey: &mut Survey) {
+        let (width, planes) = (self.head.geometry.width, self.head.geometry.channels.len());
+        for (index, line) in self.made.chunks_exact(width).enumerate() {
+            let of_row = self.classes.row(first + index / planes, index % planes);
+            line.iter().enumerate().for_each(|(x, flat)| survey.take(of_row[x % of_row.len()], *flat));
+        }
+    }
+
+    /// The means of what was taken in.
+    fn judged(&self, tally: &Tally, limits: Option<Vec<[f64; 2]>>) -> Result<FlatMeans> {
+        let Tally { sums, counts, good, full, lit, .. } = tally;
+        let classes = 0..self.classes.count();
+        if classes.clone().any(|class| 2 * full[class] > lit[class]) {
+            return Err(self
+                .head
+                .refuse("most samples of a class are saturated; expose flat fields to half of full well"));
+        }
+        if good.iter().any(|good| *good > 0) && counts.iter().all(|count| *count == 0) {
+            return Err(self.head.refuse(
+                "nowhere are the photosites of all classes side by side neither saturated nor defective; expose flat fields to half of \
+                 full well",
+            ));
+        }
+        let means: Vec<f64> = sums.iter().zip(counts).map(|(sum, count)| sum / *count as f64).collect();
+        for class in classes {
             if counts[class] > 0 && (means[class].is_nan() || means[class] <= 0.0) {
                 return Err(self.head.refuse(format!(
                     "its mean is {:.1} ADU above what no light reads; a flat field is lit",
                     means[class]
                 )));
             }
-            if 2 * full[class] > counts[class] {
-                return Err(self
-                    .head
-                    .refuse("most samples of a class are saturated; expose flat fields to half of full well"));
-            }
         }
-        let in_shares = |[low, high]: [f64; 2], mean: f64| [low / mean, high / mean];
-        let limits = survey.zip(beyond).map(|(survey, beyond)| survey.limits(beyond, 1e-6));
-        let limits = limits.map(|limits| limits.into_iter().zip(&means).map(|(l, mean)| in_shares(l, *mean)).collect());
-        let heaps = largest_of.iter().filter(|_| self.full.is_none()).filter_map(|largest| largest.heap(false));
-        let heaped = heaps.map(|(_, count)| count).sum();
-        Ok(FlatMeans { means, photosites: counts, full: full.iter().sum(), heaped, limits })
+        let left_out = good.iter().zip(counts).map(|(good, count)| good - count).collect();
+        Ok(FlatMeans { means, photosites: counts.clone(), left_out, full: full.iter().sum(), limits })
     }
 
     /// What metadata keep of them.
@@ -241,6 +350,7 @@ impl<S: RowSource> FlatFrames<S> {
             average: self.average,
             means_adu: means.means.clone(),
             photosites: means.photosites.clone(),
+            left_out: means.left_out.clone(),
             even: self.is_even,
             exposure_s: metadata.time_s(),
             temperature_k: metadata.temperature_k(),
@@ -315,13 +425,14 @@ impl<S: RowSource> RowSource for Flattened<'_, S> {
                 let (flats, largest) = (&self.flats.made[from..], &self.flats.frames.largest()[from..]);
                 for (x, (sample, mark)) in line.iter_mut().zip(marks.iter_mut()).enumerate() {
                     let class = of_row[x % of_row.len()];
-                    let gain = flats[x] / self.means.means[class];
+                    let flat = flats[x];
+                    let gain = flat / self.means.means[class];
                     if is_full(self.flats.full, x, y, plane, largest[x]) {
                         add(mark, SATURATED);
                     }
                     let is_lit = gain > 0.0 && gain.is_finite();
                     let limits = self.means.limits.as_ref().map(|limits| limits[class]);
-                    if !is_lit || limits.is_some_and(|[low, high]| !(low..=high).contains(&gain)) {
+                    if !is_lit || limits.is_some_and(|[low, high]| !(low..=high).contains(&flat)) {
                         add(mark, DEFECTIVE);
                         self.found += 1;
                     }

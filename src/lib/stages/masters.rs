@@ -94,6 +94,26 @@ pub struct Frames<S> {
     /// The same of the largest samples.
     keeps_largest: bool,
     largest: Vec<f32>,
+    /// What was read of each frame so far.
+    levels: Vec<Level>,
+}
+
+/// Sums over finite samples.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Level {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Level {
+    fn take(&mut self, samples: &[f32]) {
+        for sample in samples.iter().map(|sample| f64::from(*sample)).filter(|sample| sample.is_finite()) {
+            self.count += 1.0;
+            self.sum += sample;
+            self.squares += sample * sample;
+        }
+    }
 }
 
 impl<S: RowSource> Frames<S> {
@@ -108,7 +128,29 @@ impl<S: RowSource> Frames<S> {
             scatter: Vec::new(),
             keeps_largest: false,
             largest: Vec::new(),
+            levels: Vec::new(),
         }
+    }
+
+    /// The frame whose mean so far is farthest from the median of those of all, its mean, and that median; none where means differ by no
+    /// more than those of dark frames do.
+    pub fn unlike(&self) -> Option<(&str, [f64; 2])> {
+        /// Black levels drift by less, in ADU and as a share.
+        const DRIFT: [f64; 2] = [4.0, 0.02];
+        /// Standard deviations, all of which may be those of whole lines.
+        const Z: f64 = 8.0;
+        let mut means: Vec<f64> = self.levels.iter().map(|level| level.sum / level.count).collect();
+        let of_frames = means.clone();
+        means.sort_by(f64::total_cmp);
+        let median = f64::midpoint(*means.get(means.len().checked_sub(1)? / 2)?, means[means.len() / 2]);
+        let off = |index: &usize| (of_frames[*index] - median).abs();
+        let farthest = (0..of_frames.len()).max_by(|a, b| off(a).total_cmp(&off(b)))?;
+        let Level { count, sum, squares } = self.levels[farthest];
+        let head = self.frames[farthest].header();
+        let lines = head.geometry.width.min(head.geometry.height).max(1) as f64;
+        let scatter = (squares / count - (sum / count).powi(2)).max(0.0);
+        let allowed = DRIFT[0].max(DRIFT[1] * median.abs()) + Z * (scatter / lines).sqrt();
+        (off(&farthest) > allowed).then(|| (head.name.as_str(), [of_frames[farthest], median]))
     }
 
     /// Each of them.
@@ -170,9 +212,11 @@ impl<S: RowSource> Frames<S> {
         // Of samples less those of the first frame, so that nothing is lost.
         let mut first: Vec<f32> = Vec::new();
         let mut sums = vec![[0.0_f64; 2]; if self.keeps_scatter { samples } else { 0 }];
-        for frame in &mut self.frames {
+        self.levels.resize(self.frames.len(), Level::default());
+        for (frame, level) in self.frames.iter_mut().zip(&mut self.levels) {
             self.band.clear();
             frame.read(rows, &mut self.band)?;
+            level.take(&self.band);
             for (sum, &sample) in made.iter_mut().zip(&self.band) {
                 *sum += f64::from(sample);
             }
@@ -198,8 +242,11 @@ impl<S: RowSource> Frames<S> {
 
     fn average(&mut self, samples: usize, rows: usize, made: &mut Vec<f64>) -> Result<()> {
         self.band.clear();
-        for frame in &mut self.frames {
+        self.levels.resize(self.frames.len(), Level::default());
+        for (frame, level) in self.frames.iter_mut().zip(&mut self.levels) {
+            let from = self.band.len();
             frame.read(rows, &mut self.band)?;
+            level.take(&self.band[from..]);
         }
         if self.keeps_largest {
             let start = self.largest.len();

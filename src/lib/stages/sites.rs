@@ -31,6 +31,11 @@ impl SiteClasses {
         self.count
     }
 
+    /// Columns and rows after which classes come again; one of each where each plane is a class.
+    pub fn period(&self) -> [usize; 2] {
+        self.period.as_ref().map_or([1; 2], |(columns, sites)| [*columns, sites.len() / columns])
+    }
+
     /// The classes of the photosites in row `y` of a plane, from the first on, again and again.
     pub fn row(&self, y: usize, plane: usize) -> Vec<usize> {
         match &self.period {

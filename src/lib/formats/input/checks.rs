@@ -13,13 +13,18 @@ pub(super) struct Checks {
     /// The black level that a user says.
     pub said_black: Option<BlackLevel>,
     /// Whether samples that are heaped at the top are told.
-    pub tells_top: bool,
+    tells_top: bool,
     codes: Option<CodeCheck>,
     levels: Option<LevelCheck>,
     top: Option<TopCheck>,
 }
 
 impl Checks {
+    /// All of them, and where `tells_top` that of samples that are heaped at the top, which the first program of a pipe tells.
+    pub fn telling_top(tells_top: bool) -> Self {
+        Self { tells_top, ..Self::default() }
+    }
+
     /// Makes ready for the rows of a frame, whose layer of marks comes with them where `is_marked`; those of codes only where they are
     /// given as they are stored.
     pub fn begin(&mut self, frame: &FrameHeader, is_marked: bool, are_stored: bool) {

@@ -54,14 +54,8 @@ pub(super) fn find_metadata(
 
 fn most_trusted(reader: &dyn SampleReader, name: &str, path: Option<&Path>, given: Option<&Path>) -> Result<Found> {
     path.map_or(Ok(()), register::note_sidecar)?;
-    let from_file = |path: &Path| -> Result<Metadata> {
-        let shown = path.display().to_string();
-        let bytes = read_file(path)?;
-        let text = yaml_guard::checked_text(&bytes).map_err(|problem| Error::format(&shown, problem))?;
-        yaml::parse_metadata(&shown, text)
-    };
     if let Some(path) = given {
-        let metadata = from_file(path)?;
+        let metadata = of_file(path)?;
         let shown = path.display().to_string();
         yaml::check_misspelt(&shown, &metadata)?;
         // Ours were looked at when they were written, and a user may have changed them since.
@@ -70,7 +64,7 @@ fn most_trusted(reader: &dyn SampleReader, name: &str, path: Option<&Path>, give
         return Ok(Found { metadata, sidecar: None, place: FoundIn::Given(shown) });
     }
     if let Some(sidecar) = path.map(sidecar_path).filter(|sidecar| sidecar.is_file()) {
-        let (metadata, shown) = (from_file(&sidecar)?, sidecar.display().to_string());
+        let (metadata, shown) = (of_file(&sidecar)?, sidecar.display().to_string());
         // Another version may have written it: what is unknown is kept.
         let time = time_alone(&metadata).filter(|_| metadata.history.is_empty());
         let doubts = yaml::misspelt(&metadata).into_iter().chain(metadata.contradictions()).chain(time);
@@ -89,6 +83,18 @@ fn most_trusted(reader: &dyn SampleReader, name: &str, path: Option<&Path>, give
     }
     check_unit(reader.own_tags(), name)?;
     Ok(Found { metadata: reader.own_tags().clone(), sidecar: None, place: FoundIn::Tags })
+}
+
+/// The metadata in a file of their own.
+///
+/// # Errors
+///
+/// [`Error::Disk`] and [`Error::Format`].
+pub(super) fn of_file(path: &Path) -> Result<Metadata> {
+    let shown = path.display().to_string();
+    let bytes = read_file(path)?;
+    let text = yaml_guard::checked_text(&bytes).map_err(|problem| Error::format(&shown, problem))?;
+    yaml::parse_metadata(&shown, text)
 }
 
 /// Refuses samples that a file says are something else than codes and electrons, which most programs would take for codes.

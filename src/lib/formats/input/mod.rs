@@ -1,5 +1,6 @@
 //! Opens frames of any format, from files and pipes, with the metadata that belongs to them.
 
+mod camera;
 mod checks;
 mod codes;
 mod described;
@@ -10,7 +11,7 @@ mod opening;
 mod options;
 mod top;
 
-pub use options::{InputOptions, Linearizing};
+pub use options::{InputOptions, Linearizing, OfCamera};
 
 use self::checks::Checks;
 use self::described::DigestCheck;
@@ -74,8 +75,6 @@ pub struct FrameReader {
     rows_read: usize,
     check: Option<DigestCheck>,
     checks: Checks,
-    /// Whether a file is read, and no pipe, whose first program has told what is to be told.
-    is_of_file: bool,
     mismatch: Option<String>,
     buffer: Vec<f32>,
     /// What stored samples were multiplied with for viewers.
@@ -194,6 +193,7 @@ impl FrameReader {
             find_metadata(reader.as_ref(), name, path, options.metadata.as_deref())?;
         let stored = reader.geometry();
         let to_come = metadata.frames_to_come.take().unwrap_or_default();
+        camera::describe(&mut metadata, &place, &options.camera)?;
         let scaling = take_scaling(reader.as_ref(), &mut metadata, &place, name)?;
         let origin = placed(reader.as_ref(), metadata.origin.take(), &place, name)?;
         let (first_channel, geometry) = match &options.channel {
@@ -225,6 +225,7 @@ impl FrameReader {
             register::note_upstream(Path::new(file))?;
         }
         let mut header = FrameHeader { name: name.into(), geometry: Geometry { origin, ..geometry }, metadata };
+        camera::say(&mut header, &options.camera);
         doubt_of_marks(&header, stored);
         let corner = options.crop.map_or(Ok([0, 0]), |crop| cut(&mut header, crop))?;
         let linearize = match &options.linearize {
@@ -240,8 +241,7 @@ impl FrameReader {
             rows_read: 0,
             // A digest is one of all samples.
             check: check.filter(|_| options.crop.is_none()),
-            checks: Checks::default(),
-            is_of_file: path.is_some(),
+            checks: Checks::telling_top(options.tells_top && path.is_some()),
             mismatch: None,
             buffer: Vec::new(),
             scaling,
@@ -277,11 +277,6 @@ impl FrameReader {
     /// Takes a black level that a user says for what no light reads, where metadata tell none: a frame far below it is told.
     pub fn expect_black(&mut self, black: BlackLevel) {
         self.checks.said_black = Some(black).filter(|_| self.header.metadata.black_level_adu.is_none());
-    }
-
-    /// Has a heap of samples at the largest value told, where nothing else tells that they are saturated.
-    pub fn tell_top(&mut self) {
-        self.checks.tells_top = self.is_of_file;
     }
 
     /// How the file stores its samples, in a word: `u16`, `f32` …; `mixed` where channels differ.

@@ -2,6 +2,7 @@
 
 use crate::analysis::statistics::Region;
 use crate::camera::sensor::Sensor;
+use crate::cfa::FilterArray;
 use crate::formats::headerless;
 use crate::formats::sequence::Sequence;
 use std::path::PathBuf;
@@ -27,6 +28,21 @@ pub struct InputOptions {
     pub crop: Option<Region>,
     /// Whether codes are made proportional to charge, by the linearization of their sensor.
     pub linearize: Linearizing,
+    /// What a user says of the camera that took the frame and others, which counts where it does not say it itself.
+    pub camera: OfCamera,
+    /// Whether samples that are heaped at the top are told, where nothing else tells that they are saturated.
+    pub tells_top: bool,
+}
+
+/// What a user says of a camera.
+#[derive(Debug, Clone, Default)]
+pub struct OfCamera {
+    /// Filter array of a single plane.
+    pub cfa: Option<FilterArray>,
+    /// White level of codes.
+    pub white_level_adu: Option<f64>,
+    /// The file of metadata that describes a frame which has none: of the camera it holds for others of the same kind.
+    pub description: Option<PathBuf>,
 }
 
 /// Whether codes are made proportional to charge as they are read.

@@ -4,7 +4,7 @@ use super::light::{ImageRows, Light, Pixels, SceneImage, brightest, checked, no_
 use super::picture;
 use super::request::Scene;
 use super::sums::{Found, Sums, gap};
-use crate::camera::optics::{Exposure, doubt_of_focal_length, doubt_of_time};
+use crate::camera::optics::{Exposure, doubt_of_focal_length, is_long};
 use crate::camera::readout::ReadOut;
 use crate::camera::response::GridWeights;
 use crate::camera::sensor::Sensor;
@@ -69,12 +69,12 @@ impl Scene {
             light.scale(exposure.exposure_s);
             brightest_e = Some(fraction * full_well_e);
             let text = format!("exposure {} s", exposure.exposure_s);
-            found.notes.push(match doubt_of_time(exposure.exposure_s) {
-                Some(_) => Note::Warning(format!("the scene takes an {text}; is the unit of its radiance right?")),
-                None => Note::Remark(text),
+            found.notes.push(match is_long(exposure.exposure_s) {
+                true => Note::Warning(format!("the scene takes an {text}; is the unit of its radiance right?")),
+                false => Note::Remark(text),
             });
         }
-        found.notes.extend(overfull(&light, loaded.sensor.readout.as_ref(), self.level.expose_to));
+        found.notes.extend(overfull(&light, loaded.sensor.readout.as_ref(), self.level.expose_to, exposure.exposure_s));
         found.notes.extend(found.metadata.quadrature_error.map(inexact));
         Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, found })
     }
@@ -219,18 +219,24 @@ fn elsewhere(path: &Path) -> Option<String> {
 }
 
 /// A warning of light that fills photosites; none of light that does not, or that is not known before it is read.
-fn overfull(light: &Light, readout: Option<&ReadOut>, expose_to: Option<f64>) -> Option<Note> {
+fn overfull(light: &Light, readout: Option<&ReadOut>, expose_to: Option<f64>, exposure_s: f64) -> Option<Note> {
     let (Light::Uniform { electrons, source }, Some(readout)) = (light, readout) else { return None };
     let remedy = match source.as_str() {
         "--electrons" => "fewer of them keep",
         _ if expose_to.is_some() => "a fraction of full well below 1, as --expose-to 0.8, keeps",
         _ => "a shorter exposure, or --expose-to 0.8 in place of --exposure, keeps",
     };
+    let is_of_night = source != "--electrons" && expose_to.is_none() && is_long(exposure_s);
+    let unit = if is_of_night {
+        format!("; the exposure is {exposure_s} s, and {exposure_s} ms is {} s", exposure_s / 1000.0)
+    } else {
+        String::new()
+    };
     let full = Class::ALL.into_iter().zip(electrons).filter(|(_, e)| **e >= readout.full_well_e);
     let full: Vec<String> = full.map(|(class, e)| format!("{} expects {e:.0} e-", class.letter())).collect();
     (!full.is_empty()).then(|| {
         Note::Warning(format!(
-            "{}, but full well is {} e-: these samples will be saturated; {remedy} them below",
+            "{}, but full well is {} e-: these samples will be saturated; {remedy} them below{unit}",
             full.join(", "),
             readout.full_well_e
         ))

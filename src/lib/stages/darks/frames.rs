@@ -28,6 +28,9 @@ pub struct DarkFrames<S> {
     /// How many samples these are.
     summed: u64,
     fitness: Fitness,
+    /// How many masked photosites were left so far, the sum of what is left of them, and of its squares; in how many rows.
+    border: [f64; 3],
+    border_rows: u64,
 }
 
 impl<S: RowSource> DarkFrames<S> {
@@ -71,6 +74,8 @@ impl<S: RowSource> DarkFrames<S> {
             sums: [0.0; 2],
             summed: 0,
             fitness: Fitness::default(),
+            border: [0.0; 3],
+            border_rows: 0,
         }
     }
 
@@ -104,6 +109,40 @@ impl<S: RowSource> DarkFrames<S> {
     /// The mean of what they came off so far, and of what came off; none of none.
     pub fn means(&self) -> Option<[f64; 2]> {
         (self.summed > 0).then(|| self.sums.map(|sum| sum / self.summed as f64))
+    }
+
+    /// A frame that counts as one with others whose mean is another than theirs, its mean, and the median of all.
+    pub fn unlike(&self) -> Option<(&str, [f64; 2])> {
+        self.masters.iter().find_map(Frames::unlike)
+    }
+
+    /// The mean of what is left of masked photosites of the frame so far, and its standard deviation, all of which may be that of whole rows;
+    /// none without any.
+    pub fn left_at_border(&self) -> Option<[f64; 2]> {
+        let [count, sum, squares] = self.border;
+        let mean = sum / count;
+        let rows = (count > 0.0).then_some(self.border_rows.max(1))?;
+        Some([mean, ((squares / count - mean * mean).max(0.0) / rows as f64).sqrt()])
+    }
+
+    /// Looks at what is left of row `y` of the first plane of a frame.
+    fn look_at_border(&mut self, frame: &FrameHeader, y: usize, row: &[f32]) {
+        let [left, top] = frame.geometry.origin.map(i64::from);
+        let at = top + y as i64;
+        let mut has_any = false;
+        for [x0, y0, width, height] in &frame.metadata.masked_areas {
+            if !(*y0..y0.saturating_add(*height)).contains(&at) {
+                continue;
+            }
+            let column = |x: i64| usize::try_from(x - left).unwrap_or(0).min(frame.geometry.width);
+            for sample in row[column(*x0)..column(x0.saturating_add(*width))].iter().filter(|sample| sample.is_finite())
+            {
+                let sample = f64::from(*sample);
+                self.border = [self.border[0] + 1.0, self.border[1] + sample, self.border[2] + sample * sample];
+                has_any = true;
+            }
+        }
+        self.border_rows += u64::from(has_any);
     }
 
     /// Why they cannot well be dark frames of what they came off so far.
@@ -352,6 +391,12 @@ impl<S: RowSource> RowSource for LessDarks<'_, S> {
         }
         self.darks.fitness = fitness;
         self.darks.add_means(&seen);
+        let head = self.frame.header();
+        if !head.metadata.masked_areas.is_empty() {
+            for (y, row) in samples[start..].chunks_exact(of_frame).enumerate() {
+                self.darks.look_at_border(head, first + y, &row[..width]);
+            }
+        }
         self.mark(self.darks.rows_made - rows, &mut samples[start..]);
         Ok(())
     }

@@ -1,0 +1,153 @@
+//! Frames that come off a frame, or divide it: what is said of its camera counts for them, what scales them is the bias of its sensor, and
+//! those that lie above what no light reads are told.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use std::fs;
+use support::fits::{chance, write_fits};
+use support::workshop::{BAD_DATA, Workshop};
+
+const SIZE: [u32; 2] = [384, 32];
+const DARK: (&str, &str) = ("IMAGETYP", "'Dark Frame'");
+
+/// Codes without a header, about a level.
+fn write_raw(shop: &Workshop, name: &str, level: f64, seed: u64) {
+    let [width, height] = SIZE;
+    let code = |x: u32, y: u32| (level + 10.0 * chance(x, y, seed)).round();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "codes of 16 bits")]
+    let codes = (0..height).flat_map(|y| (0..width).flat_map(move |x| (code(x, y) as u16).to_le_bytes()));
+    fs::write(shop.path(name), codes.collect::<Vec<u8>>()).unwrap();
+}
+
+/// Sky of `level` and a dark signal over a bias of 500 ADU, both of a camera of 1 e⁻ per ADU and a read noise of 5 e⁻.
+fn write(shop: &Workshop, name: &str, [level, dark]: [f64; 2], seed: u64, cards: &[(&str, &str)]) {
+    let cards = [&[("INSTRUME", "'A'")], cards].concat();
+    let scatter = (6.0 * (25.0 + level + dark)).sqrt();
+    write_fits(shop, name, SIZE, &cards, |x, y| 500.0 + dark + level + scatter * chance(x, y, seed));
+}
+
+fn write_sensor(shop: &Workshop, dark_current_e_per_s: f64) {
+    let readout = format!(
+        "width: {}, height: {}, cfa: rggb, full_well_e: 60000, dark_current_e_per_s: {dark_current_e_per_s}, temperature_k: 263, \
+         dcnu: 0, prnu: 0, read_noise_e: 5, bits: 16, bias_adu: 500, adu_per_e: 1",
+        SIZE[0], SIZE[1]
+    );
+    fs::write(shop.path("s.yaml"), format!("schema: cyanometer-sensor/2\nname: s\nreadout: {{{readout}}}\n")).unwrap();
+}
+
+/// A description of the input holds for the frames beside that have none, but for what it says of an exposure; as options do, and as one
+/// beside each frame does.
+#[test]
+fn what_is_said_of_a_camera_counts_for_frames_beside() {
+    let shop = Workshop::new();
+    let raws = [("light.raw", 1700.0, 1), ("dark.raw", 520.0, 2), ("flat.raw", 2500.0, 3), ("flat-dark.raw", 510.0, 4)];
+    for (name, level, seed) in raws {
+        write_raw(&shop, name, level, seed);
+    }
+    let camera = "schema: cyanometer/1\nquantity: adu\ncamera: A\ncfa: grbg\nwhite_level_adu: 4095\nblack_level_adu: 500\norigin: [1, 0]\n";
+    let said = format!("{camera}exposure_time_s: 2.0\n");
+    fs::write(shop.path("said.yaml"), &said).unwrap();
+    let line = "correct-frame light.raw --raw 384x32:u16le --dark dark.raw --flat flat.raw";
+    let described = format!("{line} --flat-dark flat-dark.raw --metadata said.yaml");
+    for end in ["dng", "exr"] {
+        assert_eq!(shop.said(&format!("{described} -o described.{end}"), 0), "");
+    }
+    assert_eq!(shop.sidecar("described.dng").cfa.unwrap().to_string(), "grbg");
+    // Flats alone: the black level is that of the description.
+    let black = "correct-frame light.raw --raw 384x32:u16le --flat flat.raw --black 500 --metadata said.yaml -o b.exr";
+    assert_eq!(shop.said(black, 0), "");
+    assert!(
+        shop.said(&format!("{line} --flat-dark flat-dark.raw --scale-dark --metadata said.yaml -o s.exr"), BAD_DATA)
+            .contains("dark.raw: nothing tells its exposure time")
+    );
+    // Frames that are described themselves keep to that.
+    fs::write(shop.path("dark.raw.yaml"), camera.replace("grbg", "rggb")).unwrap();
+    assert!(
+        shop.said(&format!("{described} -o x.exr"), BAD_DATA)
+            .contains("its pattern is rggb, but that of light.raw is grbg")
+    );
+    for name in ["light", "dark", "flat", "flat-dark"] {
+        fs::write(shop.path(&format!("{name}.raw.yaml")), camera).unwrap();
+    }
+    assert_eq!(shop.said(&format!("{line} --flat-dark flat-dark.raw -o own.exr"), 0), "");
+    assert_eq!(shop.read("described.exr").0, shop.read("own.exr").0);
+}
+
+/// Dark frames of 60 s, 120 ADU of dark signal, for a frame of 30 s: what comes off it is half of both bias and dark frame, 560 ADU; of a
+/// bias of 0 it were 310. The mean of 12 288 samples of 300 ADU has a standard deviation of 0.2 ADU.
+#[test]
+fn dark_signals_are_scaled_above_the_bias_of_the_sensor_that_is_named() {
+    let shop = Workshop::new();
+    write_sensor(&shop, 2.0);
+    write(&shop, "light.fits", [300.0, 60.0], 1, &[("EXPTIME", "30.0")]);
+    write(&shop, "dark.fits", [0.0, 120.0], 2, &[DARK, ("EXPTIME", "60.0")]);
+    let line = "correct-frame light.fits --scale-dark --dark dark.fits -o out.exr";
+    assert!(shop.said(line, BAD_DATA).contains("`black_level_adu`"));
+    shop.said(&format!("{line} --sensor s.yaml"), 0);
+    let samples = shop.read("out.exr").0;
+    let mean = samples.iter().map(|sample| f64::from(*sample)).sum::<f64>() / samples.len() as f64;
+    assert!((mean - 300.0).abs() < 1.0, "{mean}");
+}
+
+/// Darks 64 ADU too high under bright light, which no sample of the frame tells: by the sensor, by a black level and a short time, by
+/// others of their kind, by masked photosites.
+#[test]
+fn darks_above_what_no_light_reads_are_told() {
+    let shop = Workshop::new();
+    write_sensor(&shop, 0.1);
+    let cards = [DARK, ("EXPTIME", "0.05")];
+    write(&shop, "light.fits", [4000.0, 0.0], 1, &[("EXPTIME", "0.05")]);
+    for seed in 2..6 {
+        write(&shop, &format!("dark{seed}.fits"), [0.0, 0.0], seed, &cards);
+    }
+    write(&shop, "high.fits", [64.0, 0.0], 7, &cards);
+    let line = |darks: &str, more: &str| {
+        let darks = darks.split(' ').map(|dark| format!("--dark {dark}.fits")).collect::<Vec<_>>().join(" ");
+        format!("correct-frame light.fits {darks} {more} -o out.exr").replace("  ", " ")
+    };
+    let good = "dark2 dark3 dark4 dark5";
+    let sensor = "--sensor s.yaml";
+    assert_eq!(shop.said(&line(good, sensor), 0), "");
+    assert_eq!(shop.said(&line(good, ""), 0), "");
+    let high = "by the frame's sensor dark frames have 510.1 ADU at most";
+    assert!(shop.said(&line("high", sensor), 0).contains(high), "{}", shop.said(&line("high", sensor), 0));
+    // Nothing tells it of a camera that nobody knows.
+    assert_eq!(shop.said(&line("high", ""), 0), "");
+    for combine in ["mean", "median"] {
+        let told = shop.said(&line(&format!("{good} high"), &format!("--combine {combine}")), 0);
+        assert!(told.contains("high.fits: its mean is 56") && told.contains("which it counts as one with "), "{told}");
+    }
+    let metadata = "schema: cyanometer/1\nquantity: adu\ncamera: A\ncfa: rggb\nexposure_time_s: 0.05\n";
+    fs::write(shop.path("light.fits.yaml"), format!("{metadata}black_level_adu: 500\n")).unwrap();
+    assert_eq!(shop.said(&line("dark2", ""), 0), "");
+    let told = shop.said(&line("high", ""), 0);
+    assert!(told.contains("by the frame's black level dark frames have 525.0 ADU at most"), "{told}");
+    // Photosites of the light frame that no light reaches: its first 16 columns.
+    write_fits(&shop, "light.fits", SIZE, &[("INSTRUME", "'A'")], |x, y| {
+        500.0 + if x < 16 { 12.0 * chance(x, y, 1) } else { 4000.0 + 160.0 * chance(x, y, 1) }
+    });
+    fs::write(shop.path("light.fits.yaml"), format!("{metadata}masked_areas: [[0, 0, 16, 32]]\n")).unwrap();
+    assert_eq!(shop.said(&line("dark2", ""), 0), "");
+    let told = shop.said(&line("high", ""), 0);
+    assert!(told.contains("light.fits: -6") && told.contains("ADU are left of its masked photosites"), "{told}");
+}
+
+/// Codes that are made straight end beyond 4095: flats that reach up to 4080 are not saturated, though straight codes of 3950 are 4109.
+#[test]
+fn a_white_level_that_is_said_is_one_of_codes_as_they_come() {
+    let shop = Workshop::new();
+    let readout = format!(
+        "width: {}, height: {}, cfa: rggb, full_well_e: 600000, dark_current_e_per_s: 0, temperature_k: 263, dcnu: 0, prnu: 0, \
+         read_noise_e: 5, bits: 12, bias_adu: 100, adu_per_e: 0.01, linearization: {{polynomial: [1.0, 1.2e-5]}}",
+        SIZE[0], SIZE[1]
+    );
+    fs::write(shop.path("s.yaml"), format!("schema: cyanometer-sensor/2\nname: s\nreadout: {{{readout}}}\n")).unwrap();
+    write_raw(&shop, "light.raw", 1000.0, 1);
+    write_raw(&shop, "flat.raw", 4050.0, 2);
+    let line =
+        "correct-frame light.raw --raw 384x32:u16le --cfa rggb --white 4095 --black 100 --sensor s.yaml --linearize";
+    let said = shop.said(&format!("{line} --flat flat.raw -o out.exr"), 0);
+    assert!(!said.contains("saturated"), "{said}");
+}

@@ -1,0 +1,97 @@
+//! Flat fields whose light falls off towards the corners: colors are those of the scene, whatever part of a class is saturated.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+mod support;
+
+use cyanometer::formats::input::{FrameReader, InputOptions};
+use cyanometer::stream::RowSource;
+use std::fs;
+use support::fits::{chance, write_fits};
+use support::workshop::Workshop;
+
+const SIZE: [u32; 2] = [161, 121];
+const BLACK: f64 = 500.0;
+const WHITE: f64 = 16_000.0;
+
+/// Codes by column and row.
+type Codes = Box<dyn Fn(u32, u32) -> f64>;
+
+/// The class R, G or B of a photosite of RGGB.
+fn class(x: u32, y: u32) -> usize {
+    (x % 2 + y % 2) as usize
+}
+
+/// What is left of light towards the corners: half of it in the farthest.
+fn falloff(x: u32, y: u32) -> f64 {
+    let [x, y] = [[x, SIZE[0]], [y, SIZE[1]]].map(|[at, side]| 2.0 * f64::from(at) / f64::from(side) - 1.0);
+    1.0 - 0.25 * (x * x + y * y)
+}
+
+/// Codes of such light on R, G and B, of a camera of 2 e⁻ per ADU.
+fn lit(levels: [f64; 3], seed: u64) -> impl Fn(u32, u32) -> f64 {
+    move |x, y| {
+        let signal = levels[class(x, y)] * falloff(x, y);
+        (BLACK + signal + (6.0 * (0.5 * signal + 9.0)).sqrt() * chance(x, y, seed)).min(WHITE)
+    }
+}
+
+/// Means of R, G and B over photosites without a mark, and how many these are.
+fn means(shop: &Workshop, name: &str) -> ([f64; 3], u64) {
+    let options = InputOptions { path: Some(shop.path(name)), ..InputOptions::default() };
+    let mut reader = FrameReader::open(&options).unwrap();
+    reader.keep_mask();
+    let mut samples = Vec::new();
+    reader.read(SIZE[1] as usize, &mut samples).unwrap();
+    let (mut sums, mut counts) = ([0.0; 3], [0_u64; 3]);
+    for (y, rows) in samples.chunks_exact(2 * SIZE[0] as usize).enumerate() {
+        let (row, marks) = rows.split_at(SIZE[0] as usize);
+        for (x, sample) in row.iter().enumerate().filter(|(x, _)| marks[*x] == 0.0) {
+            let class = class(u32::try_from(x).unwrap(), u32::try_from(y).unwrap());
+            sums[class] += f64::from(*sample);
+            counts[class] += 1;
+        }
+    }
+    ([0, 1, 2].map(|class| sums[class] / counts[class] as f64), counts.iter().sum())
+}
+
+/// Red of the flats is saturated in the middle, where light is brightest, or is defective there; in the corners alone its mean would be
+/// a tenth less of that of green.
+#[test]
+fn saturated_and_defective_places_tilt_no_class() {
+    let shop = Workshop::new();
+    let scene = [4000.0, 6000.0, 3000.0];
+    write_fits(&shop, "light.fits", SIZE, &[], lit(scene, 1));
+    let listed = |keep: &dyn Fn(u32, u32) -> bool| {
+        let places = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| [x, y]));
+        places.filter(|[x, y]| keep(*x, *y)).map(|[x, y]| format!("{x},{y}\n")).collect::<String>()
+    };
+    fs::write(shop.path("middle.txt"), listed(&|x, y| class(x, y) == 0 && falloff(x, y) > 0.9)).unwrap();
+    let line = "correct-frame light.fits --black 500 --white 16000 --flat flat.fits -o out.exr";
+    let dead = move |x: u32, y: u32| match class(x, y) == 0 && falloff(x, y) > 0.95 {
+        true => BLACK,
+        false => lit([7000.0; 3], 2)(x, y),
+    };
+    let cases: [(&str, Codes, &str); 4] = [
+        ("whole", Box::new(lit([7000.0; 3], 2)), ""),
+        ("saturated", Box::new(lit([18_000.0, 9000.0, 7000.0], 2)), ""),
+        ("listed", Box::new(lit([7000.0; 3], 2)), "--defects middle.txt"),
+        ("found", Box::new(dead), "--find-defects=4"),
+    ];
+    for (what, flat, more) in cases {
+        write_fits(&shop, "flat.fits", SIZE, &[], flat);
+        let said = shop.said(format!("{line} {more}").trim_end(), 0);
+        assert_eq!(said.contains("photosites of the flats are saturated"), what == "saturated", "{what}: {said}");
+        let ([red, green, blue], count) = means(&shop, "out.exr");
+        assert!(what == "whole" || count < u64::from(SIZE[0] * SIZE[1]), "{what}");
+        // Noise of a mean is 1 % over the root of 1000 photosites at most; the mean of 5000 photosites of a flat has less.
+        for (ratio, truth) in [(red / green, scene[0] / scene[1]), (blue / green, scene[2] / scene[1])] {
+            assert!((ratio / truth - 1.0).abs() < 2e-3, "{what}: {ratio} {truth}");
+        }
+    }
+    // Red is saturated in every other cell, and blue in the others: no mean is of the same places for both.
+    let is_full = |x: u32, y: u32| class(x, y) == 2 - 2 * (y / 2 % 2) as usize;
+    write_fits(&shop, "flat.fits", SIZE, &[], |x, y| if is_full(x, y) { WHITE } else { 7000.0 });
+    let refused = shop.said(line, 1);
+    assert!(refused.contains("nowhere are the photosites of all classes side by side"), "{refused}");
+}
