@@ -330,10 +330,9 @@ impl SpectralTable {
         let is_per_wavenumber =
             matches!(self.headings.first(), Some(Some(Stated::Radiance(unit))) if unit.is_per_wavenumber());
         if self.counted_in.is_of_energy() || is_per_wavenumber {
-            return Err(Error::format(
-                &self.name,
-                "a light by wavenumber or photon energy is not read; give its power per nm by wavelength",
-            ));
+            let what = if self.counted_in == WavelengthUnit::ElectronVolt { "photon energy" } else { "wavenumber" };
+            let problem = format!("a light by {what} is not read; give its power per nm by wavelength");
+            return Err(Error::format(&self.name, problem));
         }
         self.curve(None)
     }
@@ -605,19 +604,19 @@ mod tests {
     fn columns_that_are_not_wanted_may_hold_anything() {
         let values = [0.5, 1.25, 3.0];
         for text in [
-            "nm,L,flag\n400,0.5,good\n410,1.25,\n420,3,bad\n",
-            "nm,L,flag\n400,0.5,\n410,1.25,\n420,3,\n",
-            "nm,L,flag,\n400,0.5,x,\n410,1.25,,\n420,3,,\n",
-            "nm,flag,L\n400,,0.5\n410,\"a, b\",1.25\n420,x,3\n",
-            "nm;flag;L\n400;gut;0,5\n410;schlecht, naß;1,25\n420;;3\n",
+            "nm,L,note\n400,0.5,good\n410,1.25,\n420,3,bad\n",
+            "nm,L,note\n400,0.5,\n410,1.25,\n420,3,\n",
+            "nm,L,note,\n400,0.5,x,\n410,1.25,,\n420,3,,\n",
+            "nm,note,L\n400,,0.5\n410,\"a, b\",1.25\n420,x,3\n",
+            "nm;note;L\n400;gut;0,5\n410;schlecht, naß;1,25\n420;;3\n",
             "nm\tL\tM\n400\t0.5\t1\n410\t1.25\t\n420\t3\t7\n",
-            "nm L flag\n400 0.5 good\n410 1.25 bad\n420 3 good\n",
-            "nm flag L\n400 gut 0,5\n410 schlecht 1,25\n420 gut 3,0\n",
-            "nm\tflag\tL\n400\tgut\t0,5\n410\tschlecht\t1,25\n420\tgut\t3\n",
-            "nm L flag\n400 0,5 good\n410 1,25 bad\n420 3,0 good\n",
-            "nm L flag\n400 0.5 (good)\n410 1.25 (bad)\n420 3 [good]\n",
+            "nm L note\n400 0.5 good\n410 1.25 bad\n420 3 good\n",
+            "nm note L\n400 gut 0,5\n410 schlecht 1,25\n420 gut 3,0\n",
+            "nm\tnote\tL\n400\tgut\t0,5\n410\tschlecht\t1,25\n420\tgut\t3\n",
+            "nm L note\n400 0,5 good\n410 1,25 bad\n420 3,0 good\n",
+            "nm L note\n400 0.5 (good)\n410 1.25 (bad)\n420 3 [good]\n",
             "nm,L,M\n400,0.5,1\n410,1.25,nan\n420,3,7\n",
-            "id,400,410,420\nL,0.5,1.25,3\nflag,1,,2\n",
+            "id,400,410,420\nL,0.5,1.25,3\nnote,1,,2\n",
         ] {
             let table = SpectralTable::parse("a", text.as_bytes()).unwrap_or_else(|error| panic!("{text}: {error}"));
             let curve = table.curve(Some("L")).unwrap_or_else(|error| panic!("{text}: {error}"));

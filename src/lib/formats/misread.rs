@@ -158,7 +158,12 @@ fn tape7(name: &str, text: &str) -> Option<Error> {
 /// A complaint of lines that stand above the heading of a table, where there are any but one of units; or of one above numbers that is
 /// no heading of theirs.
 fn preamble(name: &str, text: &str) -> Option<Error> {
-    if let Some(([title, cells, columns], separator)) = delimited::title(text) {
+    let is_of_columns = |line: usize| {
+        let first = text.lines().nth(line - 1).and_then(|line| line.split([',', ';', '\t', ' ']).next());
+        first.is_some_and(is_of_wavelengths)
+    };
+    let title = delimited::title(text).filter(|([line, ..], _)| !is_of_columns(*line));
+    if let Some(([title, cells, columns], separator)) = title {
         // Of words between blanks more is said already.
         if separator == Separator::Blanks {
             return None;
