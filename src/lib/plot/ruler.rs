@@ -217,7 +217,7 @@ fn round_values(low: f64, high: f64, count: f64) -> Vec<f64> {
 
 /// Whether a number has no digits below that which a step begins with.
 fn is_whole(step: f64, number: f64) -> bool {
-    if !(step > 0.0) {
+    if step <= 0.0 || step.is_nan() {
         return true;
     }
     let parts = number / 10_f64.powi(decade_of(step));
