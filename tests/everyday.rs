@@ -33,6 +33,83 @@ fn uncertainties_are_no_spectra() {
     assert_eq!(shop.frame("plain.exr").samples, shop.frame("with.exr").samples);
 }
 
+/// What marks quality makes no black patch, and what marks a missing value no light.
+#[test]
+fn marks_are_no_radiances() {
+    let shop = Workshop::new();
+    let rows =
+        |more: &str| -> String { (36..=83).map(|ten| format!("{}0,{}{more}\n", ten, f64::from(ten) * 1e-3)).collect() };
+    let unit = "radiance (W m-2 sr-1 nm-1)";
+    fs::write(shop.path("plain.csv"), format!("nm,{unit}\n{}", rows(""))).unwrap();
+    fs::write(shop.path("flagged.csv"), format!("nm,{unit},quality flag\n{}", rows(",0"))).unwrap();
+    for name in ["plain", "flagged"] {
+        let said = told(&shop, &format!("render-radiance {name}.csv --exposure 0.005 --size 4x4 -o {name}.exr"));
+        assert_eq!(said.contains("`quality flag` is a flag, no spectrum"), name == "flagged", "{said}");
+    }
+    assert_eq!(shop.frame("plain.exr").samples, shop.frame("flagged.exr").samples);
+    for fill in ["-999", "-9999", "9.96921e36", "9.969209968386869E+36", "9.97e36", "1e20", "-9999.0", "1.0E+20"] {
+        fs::write(shop.path("filled.csv"), format!("nm,{unit}\n400,0.1\n\n500,{fill}\n600,0.2\n")).unwrap();
+        let refused = shop.said("render-radiance filled.csv --size 4x4 -o a.exr", BAD_DATA);
+        let wanted = format!("filled.csv: line 4, column 2: `{fill}` marks a value that is missing; leave out its row");
+        assert!(refused.contains(&wanted), "{refused}");
+    }
+    for (name, kind) in [
+        ("sqrt radiance", "a logarithm or a root, not the radiance itself"),
+        ("ln(L)", "of log10 take 10^value, of ln e^value, of sqrt value^2"),
+        ("normalized radiance", "of no scale"),
+    ] {
+        for heading in [name.to_owned(), format!("{name} (W m-2 sr-1 nm-1)")] {
+            fs::write(shop.path("made.csv"), format!("nm,{heading}\n400,0.1\n600,0.2\n")).unwrap();
+            let refused = shop.said("render-radiance made.csv --size 4x4 -o a.exr", BAD_DATA);
+            assert!(refused.contains(&format!("its values are in `{heading}`")) && refused.contains(kind), "{refused}");
+        }
+    }
+}
+
+/// The same light counted by wavelength, and by the energy of its photons per nm and per eV, of which 1 eV is λ²/1239.84 nm.
+#[test]
+fn energies_of_photons_are_the_wavelengths_that_they_have() {
+    const NM_EV: f64 = 1239.841_984;
+    let shop = Workshop::new();
+    // Smooth, and so finely sampled that straight lines between are as good in all.
+    let light = |nm: f64| 0.1 + 0.05 * (nm / 60.0).sin();
+    let rows = |row: &dyn Fn(f64) -> String| -> String { (350..=850).map(|nm| row(f64::from(nm))).collect() };
+    let unit = "W m-2 sr-1";
+    let ev = |nm: f64| NM_EV / nm;
+    for (name, heading, text) in [
+        ("nm", format!("nm,L ({unit} nm-1)"), rows(&|nm| format!("{nm},{}\n", light(nm)))),
+        ("ev", format!("photon energy (eV),L ({unit} nm-1)"), rows(&|nm| format!("{:.9},{}\n", ev(nm), light(nm)))),
+        (
+            "density",
+            format!("energy_eV,L ({unit} eV-1)"),
+            rows(&|nm| format!("{:.9},{:.9}\n", ev(nm), light(nm) * nm * nm / NM_EV)),
+        ),
+    ] {
+        fs::write(shop.path(&format!("{name}.csv")), format!("{heading}\n{text}")).unwrap();
+        shop.run(&format!("render-radiance {name}.csv --exposure 0.004 --size 2x2 -o {name}.exr"), &[]);
+    }
+    let wanted = shop.frame("nm.exr").samples;
+    for name in ["ev", "density"] {
+        let found = shop.frame(&format!("{name}.exr")).samples;
+        assert!(found.iter().zip(&wanted).all(|(a, b)| (a / b - 1.0).abs() < 1e-4), "{name}: {found:?} {wanted:?}");
+    }
+    fs::write(shop.path("bare.csv"), "energy_eV,L\n1.5,0.1\n3.4,0.2\n").unwrap();
+    let refused = shop.said("render-radiance bare.csv --size 2x2 -o a.exr", BAD_DATA);
+    assert!(
+        refused.contains("it is by photon energy and does not say whether its radiance is per nm or per eV"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn spectra_that_come_with_the_programs_are_told_where_frames_are_wanted() {
+    let shop = Workshop::new();
+    for line in ["measure clear_zenith.csv", "add-noise clear_zenith.csv -o a.exr", "preview clear_zenith -o a.png"] {
+        let refused = shop.said(line, BAD_DATA);
+        assert!(refused.contains("`render-radiance clear_zenith.csv` makes a frame of it"), "{refused}");
+    }
+}
+
 #[test]
 fn relative_radiances_are_warned_of() {
     let shop = Workshop::new();

@@ -71,13 +71,38 @@ fn fitted_pictures_are_exact_means() {
     assert!(picture.pixels.iter().all(|pixel| pixel[0] < pixel[1] && pixel[1] == 188 && pixel[1] < pixel[2]));
 }
 
+/// Of a map the first quantity is what one looks for.
+#[test]
+fn maps_are_shown_in_false_color_without_a_word() {
+    let shop = Workshop::with_frames();
+    shop.run("render-radiance --electrons 8000,12000,9500 --size 8x6 -o lit.exr", &[]);
+    for (seed, name) in [(1, "a"), (2, "b")] {
+        shop.run(&format!("add-noise lit.exr --seed {seed} -o n.exr"), &[]);
+        for stage in ["digitize n.exr -o c.exr", "mosaic c.exr -o p.exr", "demosaic p.exr -o d.exr"] {
+            shop.run(stage, &[]);
+        }
+        shop.run(&format!("to-xyz d.exr --matrix matrix.yaml -o {name}.exr"), &[]);
+    }
+    shop.run("to-xyz d.exr --matrix matrix.yaml --space cct -o cct.exr", &[]);
+    shop.run("color-difference a.exr b.exr --map map.exr", &[]);
+    for (map, plane) in [("map", "delta_e_2000"), ("cct", "CCT")] {
+        shop.run(&format!("preview {map}.exr -o short.png"), &[]);
+        shop.run(&format!("preview {map}.exr --plane {plane} --false-color -o long.png"), &[]);
+        assert_eq!(shop.bytes("short.png"), shop.bytes("long.png"));
+    }
+}
+
 #[test]
 fn planes_that_are_not_there_are_told() {
     let shop = Workshop::with_frames();
     for (line, status, said) in [
         ("preview xyz.exr --plane Q -o a.png", BAD_USAGE, "xyz.exr: there is no plane `Q`; it has X, Y, Z"),
         ("preview plane.exr --plane C -o a.png", BAD_USAGE, "plane.exr: there is no plane `C`; it has Y, R, G, B"),
-        ("preview rgb.exr --false-color -o a.png", BAD_USAGE, "say with --plane which: R, G, B"),
+        (
+            "preview rgb.exr --false-color -o a.png",
+            BAD_USAGE,
+            "one of its 3 planes, R, G, B; say which, as with --plane R",
+        ),
         ("preview xyz.exr --plane Y -o a.png", BAD_DATA, "give --range LOW,HIGH, or --false-color"),
         ("preview rgb.exr --range 9%,1% -o a.png", BAD_USAGE, "the lower share stands first"),
         ("preview rgb.exr --fit 4 -o a.png", BAD_USAGE, "--fit"),

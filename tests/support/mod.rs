@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each file of tests takes what it needs")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
+pub mod advised;
 pub mod bounds;
 pub mod dng;
 pub mod fits;

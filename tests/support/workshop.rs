@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "each file of tests takes what it needs")]
 
-use super::TREE;
+use super::{TREE, advised};
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::output::{FrameWriter, OutputOptions};
 use cyanometer::formats::yaml::parse_metadata;
@@ -73,7 +73,8 @@ impl Workshop {
         command
     }
 
-    /// Runs a command on `input` to its end.
+    /// Runs a command on `input` to its end. Whatever it says names options that it has.
+    #[track_caller]
     pub fn attempt(&self, line: &str, input: &[u8]) -> Output {
         let mut command = self.command(line);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -84,6 +85,7 @@ impl Workshop {
         let writer = std::thread::spawn(move || drop(stdin.write_all(&input)));
         let output = child.wait_with_output().unwrap();
         writer.join().unwrap();
+        advised::check(line, &String::from_utf8_lossy(&output.stderr));
         output
     }
 

@@ -1,6 +1,7 @@
 //! What to do about an error, in the options of the program that met it.
 
 use crate::error::Error;
+use crate::formats::data::spectrum_file;
 use crate::names::nearest;
 use clap::Command;
 use std::ffi::OsString;
@@ -40,7 +41,9 @@ pub(super) fn advised(error: &Error, command: &Command) -> String {
         }
         Error::Disk { file, action: "open", source } if source.kind() == io::ErrorKind::NotFound => {
             let words: Vec<OsString> = std::env::args_os().skip(1).collect();
-            let hint = misplaced(file, command, &in_text(&words)).or_else(|| near_file(Path::new(file)));
+            let path = Path::new(file);
+            let hint = misplaced(file, command, &in_text(&words)).or_else(|| known_spectrum(path));
+            let hint = hint.or_else(|| near_file(path));
             hint.map_or_else(|| error.to_string(), |hint| format!("{error}; {hint}"))
         }
         _ => error.to_string(),
@@ -64,6 +67,14 @@ fn misplaced(word: &str, command: &Command, words: &[String]) -> Option<String> 
     let option = command.get_arguments().find(|argument| argument.get_long() == Some(long));
     let takes_behind = option.is_some_and(clap::Arg::is_require_equals_set);
     takes_behind.then(|| format!("a value of --{long} stands behind `=`, as in `--{long}={word}`"))
+}
+
+/// What a name of no file is that is known as one of a spectrum, to programs that read frames.
+fn known_spectrum(path: &Path) -> Option<String> {
+    let named = [path.to_owned(), path.with_extension("csv")];
+    let known = named.into_iter().find(|path| spectrum_file(path) != *path)?;
+    let name = known.display();
+    Some(format!("a spectrum of that name comes with the programs: `render-radiance {name}` makes a frame of it"))
 }
 
 /// The file in the same directory whose name is nearest to one that is not there.

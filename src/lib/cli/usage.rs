@@ -35,7 +35,8 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
         ErrorKind::ValueValidation => {
             let reason = std::error::Error::source(error)
                 .map_or(String::new(), |source| format!(": {}", number_complaint(&source.to_string())));
-            format!("`{value}` is no value for {argument}{reason}")
+            let hint = respelled(&value, command, words).map_or(String::new(), |text| format!("; write {text}"));
+            format!("`{value}` is no value for {argument}{reason}{hint}")
         }
         ErrorKind::MissingRequiredArgument if is_always_needed(&argument, command) => {
             let last = words.last().filter(|last| {
@@ -65,6 +66,41 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
     };
     let joined = if problem.ends_with('?') { " See" } else { "; see" };
     format!("{problem}{joined} `{program} --help`")
+}
+
+/// A value that is none as it would be taken: with points for decimal commas, commas for semicolons between numbers, the letter x for
+/// another sign between the sides of a size; nothing where none of these makes a value of it.
+fn respelled(value: &str, command: &Command, words: &[String]) -> Option<String> {
+    let points = value.replace(',', ".");
+    // `0,5,1,5`: every second comma parts numbers.
+    let parts: Vec<&str> = value.split(',').collect();
+    let pairs = || parts.chunks(2).map(|pair| pair.join(".")).collect::<Vec<_>>().join(",");
+    let candidates = [
+        points.clone(),
+        points.replace(';', ",").replace(' ', ""),
+        value.replace(';', ",").replace(' ', ""),
+        if parts.len() > 2 && parts.len().is_multiple_of(2) { pairs() } else { points.clone() },
+        // `0:5`, `0-5`: of more numbers these may be other things.
+        if parts.len() == 1 && value.matches([':', '-']).count() == 1 {
+            value.replace([':', '-'], ",")
+        } else {
+            points.clone()
+        },
+        value.replace(['×', '*', 'X', ',', ';', ' '], "x").replace("xx", "x"),
+    ];
+    let given: Vec<usize> = (0..words.len()).filter(|place| words[*place].ends_with(value)).collect();
+    let is_taken = |candidate: &String| {
+        given.iter().any(|place| {
+            let mut words: Vec<String> = std::iter::once(String::new()).chain(words.iter().cloned()).collect();
+            let word = &mut words[place + 1];
+            *word = format!("{}{candidate}", &word[..word.len() - value.len()]);
+            let refused = command.clone().try_get_matches_from(words).err();
+            // Another word may be wrong as well.
+            let wrong = refused.as_ref().and_then(|error| error.get(ContextKind::InvalidValue));
+            !matches!(wrong, Some(ContextValue::String(wrong)) if wrong == candidate || wrong == value)
+        })
+    };
+    candidates.into_iter().filter(|candidate| candidate != value).find(is_taken)
 }
 
 /// Options as people guess them, and what they are here; it counts where the program has the option.
@@ -137,6 +173,9 @@ mod tests {
             .arg(Arg::new("input"))
             .arg(Arg::new("seed").long("seed").value_parser(clap::value_parser!(u8)))
             .arg(Arg::new("method").long("method").value_parser(["bi", "eci"]))
+            .arg(Arg::new("share").long("share").short('f').value_parser(clap::value_parser!(f64)))
+            .arg(Arg::new("sides").long("sides").value_parser(crate::requests::values::size))
+            .arg(Arg::new("three").long("three").value_parser(crate::requests::values::three_numbers))
             .arg(Arg::new("size").long("size").num_args(2))
             .arg(Arg::new("dark").long("dark").action(ArgAction::SetTrue).conflicts_with("seed"))
             .arg(Arg::new("level").long("level").num_args(1).require_equals(true))
@@ -166,6 +205,22 @@ mod tests {
             ("--output a --seed x", "`x` is no value for --seed <seed>: a whole number is wanted"),
             ("--output a --seed 256", "`256` is no value for --seed <seed>: it lies within 0 and 255"),
             ("a", "--output <output> is missing"),
+            ("--share 0,033", "`0,033` is no value for --share <share>: a number is wanted; write 0.033"),
+            ("--share=0,033", "`0,033` is no value for --share <share>: a number is wanted; write 0.033"),
+            ("-f0,033 --sides 3", "`0,033` is no value for --share <share>: a number is wanted; write 0.033"),
+            ("--share 1,000,5", "`1,000,5` is no value for --share <share>: a number is wanted"),
+            (
+                "--three 1,5;2,5;3",
+                "`1,5;2,5;3` is no value for --three <three>: give three numbers between commas; write 1.5,2.5,3",
+            ),
+            (
+                "--three 1,5,2,5,3,5",
+                "`1,5,2,5,3,5` is no value for --three <three>: give three numbers between commas; write 1.5,2.5,3.5",
+            ),
+            (
+                "--sides 64×48",
+                "`64×48` is no value for --sides <sides>: a size is WIDTHxHEIGHT in photosites, such as 1332x1000; write 64x48",
+            ),
             ("--output a --output b", "--output <output> is given twice"),
             ("--output a --dark --seed 1", "--dark and --seed <seed> exclude each other"),
             ("--output a --clip", "--dark is missing, without which an option that is given has no effect"),

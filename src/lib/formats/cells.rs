@@ -71,12 +71,14 @@ impl Cells {
             for (column, cell) in record.iter().enumerate() {
                 has_points |= cell.contains('.') && number(cell).is_some();
                 has_commas |= decimal(cell).is_some();
-                numbers.push(match numeric(cell) {
+                let value = numeric(cell);
+                numbers.push(match value.filter(|value| by_rows && column == 0 || !is_fill(*value)) {
                     Some(value) => value,
                     // The label of a row need not be a number.
                     None if by_rows && column == 0 => 0.0,
                     None => {
-                        let problem = format!("line {}, column {}", line(), column + 1) + &not_a_number(cell);
+                        let what = if value.is_some() { fills(cell) } else { not_a_number(cell) };
+                        let problem = format!("line {}, column {}{what}", line(), column + 1);
                         let curve = if by_rows { Some(rows - 1) } else { column.checked_sub(1) };
                         let Some(curve) = curve.filter(|_| spoiled.len() < MAX_SPOILED) else {
                             return Err(refuse(problem));
@@ -100,10 +102,26 @@ impl Cells {
     }
 }
 
+impl Cells {
+    /// The same without the first column, where what follows it are wavelengths.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] for a wavelength that is no number.
+    pub(super) fn without_first(self, name: &str) -> Result<Self> {
+        if let Some(problem) = self.spoiled.get(&0) {
+            return Err(Error::format(name, problem.clone()));
+        }
+        let numbers = self.numbers.slice(ndarray::s![.., 1..]).to_owned();
+        let spoiled = self.spoiled.into_iter().map(|(curve, problem)| (curve - 1, problem)).collect();
+        Ok(Self { numbers, labels: self.labels, spoiled })
+    }
+}
+
 /// What to do about a number with marks of thousands, `1.234,5`, `1,234.5` or `1'234`; nothing of another cell.
 pub(super) fn thousands(cell: &str) -> Option<String> {
     let unsigned = cell.strip_prefix(['+', '-']).unwrap_or(cell);
-    let mark = unsigned.chars().find(|c| !c.is_ascii_digit()).filter(|c| ",.'’\u{a0}\u{202f}".contains(*c))?;
+    let mark = unsigned.chars().find(|c| !c.is_ascii_digit()).filter(|c| ",.'’ \u{a0}\u{2009}\u{202f}".contains(*c))?;
     let groups: Vec<&str> = unsigned.split(mark).collect();
     let (last, decimals) = match groups.last()?.split_once([',', '.']) {
         Some((last, decimals)) => (last, Some(decimals)),
@@ -123,6 +141,39 @@ pub(super) fn thousands(cell: &str) -> Option<String> {
     let decimals =
         decimals.filter(|decimals| !decimals.is_empty()).map_or(String::new(), |decimals| format!(".{decimals}"));
     is_so.then(|| format!("`{cell}` has marks of thousands; write it as {plain}{last}{decimals}, and so all numbers"))
+}
+
+/// Whether a number is one that other programs put where they have no value: as people choose it, and as NetCDF fills what is not written.
+fn is_fill(value: f64) -> bool {
+    /// Of NetCDF's floats people write as few digits as three.
+    const NETCDF: f64 = 9.969_209_968_386_869e36;
+    const ROUNDED: f64 = 2e-3;
+    const CHOSEN: [f64; 17] = [
+        -99.0,
+        -999.0,
+        -9999.0,
+        -99_999.0,
+        -999_999.0,
+        -99.9,
+        -999.9,
+        -9999.9,
+        -999.99,
+        -32_767.0,
+        -32_768.0,
+        -2_147_483_647.0,
+        1e15,
+        1e20,
+        1e30,
+        1e35,
+        1e36,
+    ];
+    let is_chosen = CHOSEN.contains(&value) || CHOSEN[CHOSEN.len() - 5..].contains(&-value) || value == -1e34;
+    is_chosen || (value.abs() / NETCDF - 1.0).abs() < ROUNDED
+}
+
+/// What is said of a cell with such a number.
+fn fills(cell: &str) -> String {
+    format!(": `{cell}` marks a value that is missing; leave out its row, or fill it in")
 }
 
 /// What is wrong with a cell, and what to do where it stands for a value that is missing.
@@ -169,6 +220,11 @@ impl<'a> Text<'a> {
 
     pub(super) fn rows(&self) -> &str {
         self.plain.as_deref().unwrap_or(&self.decoded)
+    }
+
+    /// The character that parts the cells of its rows.
+    pub(super) fn separator(&self) -> char {
+        self.separator.byte().into()
     }
 
     /// A reader of its rows.

@@ -7,11 +7,12 @@
 use super::cells::{Cells, MAX_COLUMNS, Text, numeric, unpacked};
 use super::delimited;
 use super::factors::doubt_of_factor;
-use super::foreign::csv_complaint;
+use super::foreign::{csv_complaint, line_of};
 use super::misread::{self, is_units};
 use super::radiance_unit::{self, FileSays};
 use super::register;
 use super::remarks::{Comments, MAX_COMMENTS};
+use super::spectral_heading::{self, Wavelengths, check_first_column, is_behind_index, refuse_index, without_first};
 use super::uncertainties;
 use super::wavelengths::{check_nm, check_order, check_stated};
 use crate::error::{Error, Result};
@@ -70,8 +71,8 @@ pub struct SpectralTable {
     remarks: Vec<Stated>,
     /// What a comment that begins as `Unit:` says they are, where that is no radiance.
     other_quantity: Option<Stated>,
-    /// Whether its wavelengths were given as wavenumbers.
-    by_wavenumber: bool,
+    /// The unit in which its wavelengths were given, or their wavenumbers, or the energies of their photons.
+    counted_in: WavelengthUnit,
     /// Whether nothing says what its columns are.
     is_bare: bool,
 }
@@ -90,59 +91,60 @@ impl SpectralTable {
     }
 
     fn of_text(name: &str, text: &Text) -> Result<Self> {
-        let refuse = |problem: &str| Err(Error::format(name, problem));
         let mut reader = text.reader(false);
-        let mut first = StringRecord::new();
-        if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, text.rows(), &e))? {
-            return refuse(if text.decoded.trim().is_empty() { "it is empty" } else { "it holds no rows" });
-        }
-        if text.is_ambiguous(&first) {
-            return refuse(
-                "its commas part columns or decimals, nobody can tell which; part its columns by semicolons, tabs or blanks, or \
-                 give it a header",
-            );
-        }
+        let first = first_record(name, text, &mut reader)?;
         let has_header = numeric(&first[0]).is_none();
         if has_header {
             let comments: Vec<&str> = delimited::comments(&text.decoded).take(MAX_COMMENTS).collect();
             misread::check_heading(name, text.rows(), &first, &comments)?;
         }
-        let by_rows = has_header && first.len() > 2 && first.iter().skip(1).all(|cell| numeric(cell).is_some());
+        let heads = if has_header { heading_wavelengths(name, text, &first)? } else { None };
+        let by_rows = heads.is_some();
         let below = if has_header && !by_rows { record_below(name, text.rows(), &mut reader)? } else { None };
         let (units, at_hand) = match below {
             Some(record) if is_units(&first, &record) => (Some(record), None),
             record => (None, record.or_else(|| (!has_header).then(|| first.clone()))),
         };
-        if has_header && !by_rows {
+        let above_columns = has_header && !by_rows;
+        // Names, or times, before wavelengths are no numbers.
+        let misplaced =
+            |error| if above_columns { check_first_column(name, &first).err().unwrap_or(error) } else { error };
+        let cells = Cells::read(name, text.rows(), &mut reader, at_hand.as_ref(), by_rows).map_err(misplaced)?;
+        let (first, units, cells) = match above_columns && is_behind_index(&first, &cells.numbers) {
+            true => (without_first(&first), units.as_ref().map(without_first), cells.without_first(name)?),
+            false => (first, units, cells),
+        };
+        if above_columns {
             check_first_column(name, &first)?;
         }
-        let Cells { numbers, labels, spoiled } =
-            Cells::read(name, text.rows(), &mut reader, at_hand.as_ref(), by_rows)?;
-        let (rows, width) = numbers.dim();
-        if width < 2 || rows == 0 {
-            return refuse("it needs a column of wavelengths in nm and at least one of values");
-        }
-        if !has_header && holds_rows_without_names(&numbers) {
-            return refuse(
-                "its first row holds wavelengths, and its rows are spectra without names; begin each with a name, and the first \
-                 with a word, as in `name,400,410`",
-            );
-        }
+        let Cells { numbers, labels, spoiled } = cells;
+        check_shape(name, &numbers, has_header)?;
+        let width = numbers.ncols();
         let values = numbers.slice(ndarray::s![.., 1..]);
-        let (wavelengths, columns, values) = if by_rows {
-            (first.iter().skip(1).filter_map(numeric).collect(), labels, values.to_owned())
-        } else {
-            (numbers.column(0).to_vec(), names(has_header.then_some(&first), width), values.t().to_owned())
+        let named_in_comment = if has_header { None } else { spectral_heading::in_comment(&text.decoded, width) };
+        let unit_of_heads = heads.as_ref().and_then(|heads| heads.unit);
+        let (wavelengths, columns, values) = match heads {
+            Some(heads) => (heads.values, labels, values.to_owned()),
+            None => {
+                let said = if has_header { Some(without_first(&first)) } else { named_in_comment.clone() };
+                (numbers.column(0).to_vec(), names(said.as_ref(), width), values.t().to_owned())
+            }
         };
         let comments = Comments::of(&text.decoded);
         doubt_of_factor(&text.decoded).into_iter().for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
         let headings = headings(&columns, units.as_ref(), by_rows.then_some(&first[0]));
         let heading = units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && !is_of_radiance(cell));
-        let unit = wavelength_unit(heading).map_err(|problem| Error::format(name, problem))?.or(comments.wavelength);
+        let unit = match unit_of_heads {
+            Some(unit) => Some(unit),
+            None => wavelength_unit(heading).map_err(|problem| Error::format(name, problem))?.or(comments.wavelength),
+        };
+        if unit.is_none() && !by_rows {
+            refuse_index(name, &numbers)?;
+        }
         let (wavelength_nm, values) =
             in_nm(wavelengths, values, unit).map_err(|problem| Error::format(name, problem))?;
-        let by_wavenumber = unit == Some(WavelengthUnit::PerCentimeter);
-        let is_bare = !has_header;
+        let counted_in = unit.unwrap_or(WavelengthUnit::Nanometer);
+        let is_bare = !has_header && named_in_comment.is_none();
         let Comments { units: remarks, other_quantity, .. } = comments;
         let table = Self {
             name: name.to_owned(),
@@ -153,7 +155,7 @@ impl SpectralTable {
             headings,
             remarks,
             other_quantity,
-            by_wavenumber,
+            counted_in,
             is_bare,
         };
         Ok(table.without_uncertainties())
@@ -196,12 +198,17 @@ impl SpectralTable {
         let Some(column) = column else { return Ok(0) };
         let is_it = |name: &&str| name.eq_ignore_ascii_case(column);
         let exact = place_of(column, self.columns.iter().map(String::as_str));
+        // Of columns that a comment names, too.
+        let counted = || {
+            let number = column.to_ascii_lowercase().strip_prefix("column")?.parse::<usize>().ok()?;
+            number.checked_sub(1).filter(|place| *place < self.columns.len())
+        };
         // The name of `sky (mW m-2 sr-1 nm-1)` is `sky`, where no other column's is.
         let bare = || {
             let mut places = (0..self.columns.len()).filter(|place| is_it(&without_unit(&self.columns[*place])));
             places.next().filter(|_| places.next().is_none())
         };
-        exact.or_else(bare).ok_or_else(|| {
+        exact.or_else(bare).or_else(counted).ok_or_else(|| {
             let some: Vec<&str> = self.columns.iter().take(8).map(String::as_str).collect();
             Error::Usage(format!("{}: there is no column `{column}`; it has {}", self.name, some.join(", ")))
         })
@@ -230,7 +237,7 @@ impl SpectralTable {
 
     /// What its rows go along.
     fn along(&self) -> Along {
-        if self.by_wavenumber { Along::Wavenumber } else { Along::Wavelength }
+        if self.counted_in.is_of_energy() { Along::Wavenumber } else { Along::Wavelength }
     }
 
     /// The wavelengths at which its radiances are taken, `given` the unit that the user says they have: those of its rows, and more
@@ -269,8 +276,10 @@ impl SpectralTable {
         let other = self.other_quantity.as_ref().filter(|_| !names_radiance);
         let heading = self.headings.get(index).and_then(Option::as_ref).or(other);
         let place = "in the heading, as in `radiance (W m-2 sr-1 nm-1)`";
-        if self.by_wavenumber && heading.is_none() && self.remarks.is_empty() && given.is_none() {
-            let problem = "it is by wavenumber and does not say whether its radiance is per nm or per cm-1";
+        if self.counted_in.is_of_energy() && heading.is_none() && self.remarks.is_empty() && given.is_none() {
+            let what = if self.counted_in == WavelengthUnit::ElectronVolt { "photon energy" } else { "wavenumber" };
+            let problem =
+                format!("it is by {what} and does not say whether its radiance is per nm or per {}", self.counted_in);
             return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
         }
         if self.is_bare && self.columns.len() + 1 == misread::UVSPEC && self.remarks.is_empty() && given.is_none() {
@@ -279,7 +288,6 @@ impl SpectralTable {
                            they are";
             return Err(Error::format(&self.name, problem));
         }
-        self.check_filled(index)?;
         let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
         let (unit, assumed) = radiance_unit::settle(says, given)?;
         let Some(times) = self.times_white(index, unit) else { return Ok((unit, assumed)) };
@@ -299,21 +307,6 @@ impl SpectralTable {
         let all = self.columns.iter().zip(&self.headings).enumerate();
         let likely = all.filter(|(index, (_, says))| !is_other(says) && !self.spoiled.contains_key(index));
         likely.map(|(_, (column, _))| column.as_str()).collect()
-    }
-
-    /// Refuses values that stand for none.
-    fn check_filled(&self, index: usize) -> Result<()> {
-        /// What other programs put where they have no value.
-        const MARKS: [f64; 6] = [-99.0, -999.0, -9999.0, -99_999.0, -1e30, -1e34];
-        let values = self.values.row(index);
-        let Some(mark) = values.iter().copied().find(|value| MARKS.contains(value)) else { return Ok(()) };
-        let count = values.iter().filter(|value| **value == mark).count();
-        let which = if self.columns.len() > 1 { format!("`{}`: ", self.columns[index]) } else { String::new() };
-        let problem = format!(
-            "{which}{count} of {} values are {mark}, which marks values that are missing; leave their rows out",
-            values.len()
-        );
-        Err(Error::format(&self.name, problem))
     }
 
     /// How many times as bright as a white cloud in the sun radiances are in a unit, where no sky is so bright.
@@ -336,11 +329,10 @@ impl SpectralTable {
     pub fn light(&self) -> Result<Curve> {
         let is_per_wavenumber =
             matches!(self.headings.first(), Some(Some(Stated::Radiance(unit))) if unit.is_per_wavenumber());
-        if self.by_wavenumber || is_per_wavenumber {
-            return Err(Error::format(
-                &self.name,
-                "a light by wavenumber is not read; give its power per nm by wavelength",
-            ));
+        if self.counted_in.is_of_energy() || is_per_wavenumber {
+            let what = if self.counted_in == WavelengthUnit::ElectronVolt { "photon energy" } else { "wavenumber" };
+            let problem = format!("a light by {what} is not read; give its power per nm by wavelength");
+            return Err(Error::format(&self.name, problem));
         }
         self.curve(None)
     }
@@ -359,6 +351,37 @@ impl SpectralTable {
             format!("{}: {which}{count} of {all} radiances are below 0, down to {least}, which no light is", self.name)
         })
     }
+}
+
+/// The first row of a table.
+fn first_record(name: &str, text: &Text, reader: &mut csv::Reader<&[u8]>) -> Result<StringRecord> {
+    let refuse = |problem: &str| Err(Error::format(name, problem));
+    let mut first = StringRecord::new();
+    if !reader.read_record(&mut first).map_err(|e| csv_complaint(name, text.rows(), &e))? {
+        return refuse(if text.decoded.trim().is_empty() { "it is empty" } else { "it holds no rows" });
+    }
+    if text.is_ambiguous(&first) {
+        return refuse(
+            "its commas part columns or decimals, nobody can tell which; part its columns by semicolons, tabs or blanks, or \
+             give it a header",
+        );
+    }
+    Ok(first)
+}
+
+/// Refuses numbers that are too few for a table, or rows of spectra without a heading that says so.
+fn check_shape(name: &str, numbers: &Array2<f64>, has_header: bool) -> Result<()> {
+    let refuse = |problem: &str| Err(Error::format(name, problem));
+    if numbers.ncols() < 2 || numbers.nrows() == 0 {
+        return refuse("it needs a column of wavelengths in nm and at least one of values");
+    }
+    if !has_header && holds_rows_without_names(numbers) {
+        return refuse(
+            "its first row holds wavelengths, and its rows are spectra without names; begin each with a name, and the first \
+             with a word, as in `name,400,410`",
+        );
+    }
+    Ok(())
 }
 
 /// Whether numbers without a heading are a row of wavelengths above spectra: the first goes one way and is that of wavelengths, the
@@ -380,21 +403,12 @@ fn record_below(name: &str, text: &str, reader: &mut csv::Reader<&[u8]>) -> Resu
     Ok(is_there.then_some(record))
 }
 
-/// Refuses a header that names wavelengths in another column than the first.
-fn check_first_column(name: &str, header: &StringRecord) -> Result<()> {
-    let is_wavelength = |cell: &str| {
-        let word = cell.trim().to_lowercase();
-        word.starts_with("wavelength") || word.starts_with("lambda") || word == "wl" || word == "nm"
-    };
-    match header.iter().position(is_wavelength) {
-        None | Some(0) => Ok(()),
-        Some(place) => {
-            let (shown, column) = (header[place].trim(), place + 1);
-            let problem =
-                format!("its wavelengths, `{shown}`, stand in column {column}; they must be the first column");
-            Err(Error::format(name, problem))
-        }
-    }
+/// The wavelengths of a heading above rows of spectra.
+fn heading_wavelengths(name: &str, text: &Text, heading: &StringRecord) -> Result<Option<Wavelengths>> {
+    let line = line_of(text.rows(), heading.position());
+    let below = delimited::rows(text.rows()).nth(1).unwrap_or_default();
+    let below = below.split(text.separator()).next().unwrap_or_default().trim();
+    spectral_heading::wavelengths(name, line, heading, below)
 }
 
 /// What headings say about the unit of each curve: those of its column in a row of units and in the header; where curves are
@@ -414,18 +428,24 @@ fn headings(columns: &[String], units: Option<&StringRecord>, corner: Option<&st
     columns.iter().enumerate().map(one).collect()
 }
 
-/// The names of so many columns less that of wavelengths: those of a header, or numbers from 1.
-fn names(header: Option<&StringRecord>, width: usize) -> Vec<String> {
-    match header {
-        Some(header) => header.iter().skip(1).map(ToOwned::to_owned).collect(),
+/// The names of so many columns less that of wavelengths: as they are said, or numbers from 1.
+fn names(said: Option<&StringRecord>, width: usize) -> Vec<String> {
+    match said {
+        Some(said) => said.iter().map(ToOwned::to_owned).collect(),
         None => (1..width).map(|column| format!("column{column}")).collect(),
     }
 }
 
 /// Whether a heading is that of a quantity other than wavelength.
 fn is_of_radiance(heading: &str) -> bool {
-    let unknown = |stated: &Stated| matches!(stated, Stated::Other { kind: OtherUnit::Unknown, .. });
-    unit_of_heading(heading).is_some_and(|stated| !unknown(&stated))
+    let is_energy = WavelengthUnit::of_heading(heading) == Ok(Some(WavelengthUnit::ElectronVolt));
+    // `photon energy (eV)` is no number of photons.
+    let is_other = |stated: &Stated| match stated {
+        Stated::Other { kind: OtherUnit::Unknown, .. } => true,
+        Stated::Other { kind: OtherUnit::Photons, .. } => is_energy,
+        _ => false,
+    };
+    unit_of_heading(heading).is_some_and(|stated| !is_other(&stated))
 }
 
 /// Wavelengths of a unit, of nm where none is said, in nm and ascending, and the curves over them.
@@ -584,19 +604,19 @@ mod tests {
     fn columns_that_are_not_wanted_may_hold_anything() {
         let values = [0.5, 1.25, 3.0];
         for text in [
-            "nm,L,flag\n400,0.5,good\n410,1.25,\n420,3,bad\n",
-            "nm,L,flag\n400,0.5,\n410,1.25,\n420,3,\n",
-            "nm,L,flag,\n400,0.5,x,\n410,1.25,,\n420,3,,\n",
-            "nm,flag,L\n400,,0.5\n410,\"a, b\",1.25\n420,x,3\n",
-            "nm;flag;L\n400;gut;0,5\n410;schlecht, naß;1,25\n420;;3\n",
+            "nm,L,note\n400,0.5,good\n410,1.25,\n420,3,bad\n",
+            "nm,L,note\n400,0.5,\n410,1.25,\n420,3,\n",
+            "nm,L,note,\n400,0.5,x,\n410,1.25,,\n420,3,,\n",
+            "nm,note,L\n400,,0.5\n410,\"a, b\",1.25\n420,x,3\n",
+            "nm;note;L\n400;gut;0,5\n410;schlecht, naß;1,25\n420;;3\n",
             "nm\tL\tM\n400\t0.5\t1\n410\t1.25\t\n420\t3\t7\n",
-            "nm L flag\n400 0.5 good\n410 1.25 bad\n420 3 good\n",
-            "nm flag L\n400 gut 0,5\n410 schlecht 1,25\n420 gut 3,0\n",
-            "nm\tflag\tL\n400\tgut\t0,5\n410\tschlecht\t1,25\n420\tgut\t3\n",
-            "nm L flag\n400 0,5 good\n410 1,25 bad\n420 3,0 good\n",
-            "nm L flag\n400 0.5 (good)\n410 1.25 (bad)\n420 3 [good]\n",
+            "nm L note\n400 0.5 good\n410 1.25 bad\n420 3 good\n",
+            "nm note L\n400 gut 0,5\n410 schlecht 1,25\n420 gut 3,0\n",
+            "nm\tnote\tL\n400\tgut\t0,5\n410\tschlecht\t1,25\n420\tgut\t3\n",
+            "nm L note\n400 0,5 good\n410 1,25 bad\n420 3,0 good\n",
+            "nm L note\n400 0.5 (good)\n410 1.25 (bad)\n420 3 [good]\n",
             "nm,L,M\n400,0.5,1\n410,1.25,nan\n420,3,7\n",
-            "id,400,410,420\nL,0.5,1.25,3\nflag,1,,2\n",
+            "id,400,410,420\nL,0.5,1.25,3\nnote,1,,2\n",
         ] {
             let table = SpectralTable::parse("a", text.as_bytes()).unwrap_or_else(|error| panic!("{text}: {error}"));
             let curve = table.curve(Some("L")).unwrap_or_else(|error| panic!("{text}: {error}"));

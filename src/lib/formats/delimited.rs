@@ -59,6 +59,10 @@ impl Separator {
     fn makes_numbers(self, row: &str) -> bool {
         let cells: Vec<&str> = self.cells(row);
         let filled = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+        // `380;1 234,5` are no two cells between blanks.
+        if self == Self::Blanks && cells[0].contains([';', '\t']) {
+            return false;
+        }
         let is_of_decimals = || {
             let blanks = Self::Blanks.cells(row);
             let fits = |cell: &&str| !cell.contains(',') || decimal(cell).is_some();
@@ -161,6 +165,43 @@ pub fn above_heading(text: &str) -> Option<[usize; 3]> {
     Some([lines().next()?.0, last, lines().nth(heading)?.0].map(|index| index + 1))
 }
 
+/// Whether a line, from 1, has as many cells as the next that says anything.
+pub fn is_heading(text: &str, line: usize) -> bool {
+    let said = |line: &&str| !line.trim().is_empty() && comment(line, None).is_none();
+    let mut lines = text.lines().skip(line.saturating_sub(1)).filter(said);
+    let (Some(heading), Some(row)) = (lines.next(), lines.next()) else { return false };
+    let separator = Separator::of(row, true);
+    let columns = separator.cells(row).len();
+    separator.cells(heading).len() == columns || separator == Separator::Blanks && bracketed(heading).len() == columns
+}
+
+/// The first line, from 1, where it stands above rows of numbers and has another number of cells than they: with that number, theirs, and
+/// what parts these.
+pub fn title(text: &str) -> Option<([usize; 3], Separator)> {
+    const LONGEST: usize = 1 << 16;
+    let said = |(_, line): &(usize, &str)| !line.trim().is_empty() && comment(line, None).is_none();
+    let mut lines = text.lines().enumerate().filter(said).take(ROWS_LOOKED_AT);
+    let (index, first) = lines.next()?;
+    let rows: Vec<&str> = lines.map(|(_, line)| line).collect();
+    if rows.is_empty() || first.len() > LONGEST || rows.iter().any(|line| line.len() > LONGEST) {
+        return None;
+    }
+    let separator = Separator::of(&rows.join("\n"), true);
+    let columns = separator.cells(rows[0]).len();
+    let are_numbers = |row: &&str| {
+        let cells = separator.cells(row);
+        cells.len() == columns && cells.iter().all(|cell| separator.is_number(cell))
+    };
+    let cells = separator.cells(first);
+    let is_one = columns > 1
+        && cells.len() != columns
+        && rows.iter().all(are_numbers)
+        && !separator.is_number(cells.first()?)
+        // A heading with units in brackets is parted otherwise.
+        && !(separator == Separator::Blanks && bracketed(first).len() == columns);
+    is_one.then_some(([index + 1, cells.len(), columns], separator))
+}
+
 /// What stands in a comment, if a line is one. Numbers behind semicolons are a row without a label where `row`, the first
 /// that is none, has as many.
 fn comment<'a>(line: &'a str, row: Option<&str>) -> Option<&'a str> {
@@ -217,8 +258,8 @@ pub fn plain(name: &str, text: &str, separator: Separator, trims: bool) -> Resul
                 Separator::Blanks => push_cells(&mut plain, line, width).map_err(|words| {
                     let stand = if words == 1 { "word stands" } else { "words stand" };
                     let problem = format!(
-                        "line {}: {words} {stand} above {width} columns that are parted by blanks; part all cells by tabs, \
-                         commas or semicolons",
+                        "line {}: {words} {stand} above {width} columns that are parted by blanks; put a # before it if it is a \
+                         title, or part all cells by tabs, commas or semicolons",
                         index + 1
                     );
                     Error::format(name, problem)
@@ -312,7 +353,7 @@ fn push_cells(plain: &mut String, line: &str, width: usize) -> std::result::Resu
 }
 
 /// The words of a line, each with what stands in brackets behind it.
-fn bracketed(line: &str) -> Vec<&str> {
+pub(super) fn bracketed(line: &str) -> Vec<&str> {
     let (mut cells, mut begin, mut depth, mut before) = (Vec::new(), 0, 0_usize, ' ');
     for (place, character) in line.char_indices() {
         let starts = before.is_whitespace() && !character.is_whitespace() && !"([".contains(character);

@@ -49,7 +49,9 @@ pub fn csv_complaint(name: &str, rows: &str, error: &csv::Error) -> Error {
             // Of cells that something else parts, commas are those of decimals already.
             let row =
                 usize::try_from(line).ok().and_then(|line| rows.lines().nth(line.checked_sub(1)?)).unwrap_or_default();
-            let hint = if len > expected_len && row.contains(',') && !row.contains([';', '\t']) {
+            let hint = if *len == 1 && row.trim_start().starts_with(char::is_alphabetic) {
+                "; put a # before it if it is no row"
+            } else if len > expected_len && row.contains(',') && !row.contains([';', '\t']) {
                 "; part columns by semicolons or tabs where commas are those of decimals"
             } else {
                 ""

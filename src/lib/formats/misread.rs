@@ -2,9 +2,10 @@
 //! its heading, another program's form.
 
 use super::cells::{check_size, not_a_number, numeric, thousands};
-use super::delimited::{self, number};
+use super::delimited::{self, Separator, number};
 use super::foreign::line_of;
 use super::keys;
+use super::spectral_heading::{holds_wavelengths, is_of_wavelengths, names_wavelengths};
 use crate::error::{Error, Result};
 use crate::spectrum::SHORTEST_NM;
 use crate::units::{WavelengthUnit, unit_of_heading};
@@ -22,8 +23,9 @@ pub(super) const LONGEST_NM: f64 = 2000.0;
 ///
 /// [`Error::Format`] naming line and column.
 pub(super) fn check_heading(name: &str, text: &str, first: &StringRecord, comments: &[&str]) -> Result<()> {
+    let line = || line_of(text, first.position());
     let refuse = |column: usize| {
-        let line = line_of(text, first.position());
+        let line = line();
         let wrong = not_a_number(&first[column]);
         let hint = "its line looks like one of numbers (a heading begins with a word such as `wavelength_nm`)";
         Err(Error::format(name, format!("line {line}, column {}{wrong}; {hint}", column + 1)))
@@ -43,6 +45,15 @@ pub(super) fn check_heading(name: &str, text: &str, first: &StringRecord, commen
     });
     let strange = others.iter().find(|(_, cell)| numeric(cell).is_none());
     match strange {
+        Some((column, cell)) if are_wavelengths && !names_wavelengths(corner) && !is_mistyped_number(cell) => {
+            let problem = format!(
+                "line {}, column {}: `{cell}` is no wavelength, as the others are; leave the column out: one name stands before the \
+                 values of each row",
+                line(),
+                column + 1
+            );
+            Err(Error::format(name, problem))
+        }
         // One of the wavelengths of a heading.
         Some((column, _)) if are_wavelengths && !names_wavelengths(corner) => refuse(*column),
         _ if are_wavelengths => Ok(()),
@@ -65,13 +76,6 @@ fn is_mistyped_number(cell: &str) -> bool {
     unsigned.starts_with(|c: char| c.is_ascii_digit()) || 2 * digits > cell.chars().count() || holds_wavelength
 }
 
-/// Whether a cell is the heading of a column of wavelengths, or of what people give instead.
-pub(super) fn names_wavelengths(cell: &str) -> bool {
-    let lower = cell.to_lowercase();
-    ["wavelength", "lambda", "λ", "wave", "wl", "nm"].iter().any(|begin| lower.starts_with(begin))
-        || !matches!(WavelengthUnit::of_heading(cell), Ok(None))
-}
-
 /// Whether a record below the header holds units: that of wavelengths, and, below what is no heading of wavelengths, nothing but
 /// units behind it, so that a title is told from a heading.
 pub(super) fn is_units(header: &StringRecord, record: &StringRecord) -> bool {
@@ -80,9 +84,12 @@ pub(super) fn is_units(header: &StringRecord, record: &StringRecord) -> bool {
             || unit_of_heading(cell).is_some()
             || unit_of_heading(&format!("({cell})")).is_some()
     };
+    // Behind a column that counts rows.
+    let is_second = header.len() > 2 && !names_wavelengths(&header[0]) && header.get(1).is_some_and(is_of_wavelengths);
+    let place = usize::from(is_second);
     record.iter().all(|cell| numeric(cell).is_none())
-        && !matches!(WavelengthUnit::of_heading(record.get(0).unwrap_or_default()), Ok(None))
-        && (header.get(0).is_some_and(names_wavelengths) || record.iter().skip(1).all(is_unit))
+        && !matches!(WavelengthUnit::of_heading(record.get(place).unwrap_or_default()), Ok(None))
+        && (header.get(place).is_some_and(names_wavelengths) || record.iter().skip(1).all(is_unit))
 }
 
 /// What a text is that was read as no table, where that can be told.
@@ -93,7 +100,10 @@ pub(super) fn explained(name: &str, bytes: &[u8]) -> Option<Error> {
     if decoded.contains('\0') || keys::kind_of(&decoded).is_some() {
         return None;
     }
-    uvspec(name, &decoded).or_else(|| marks_of_thousands(name, &decoded)).or_else(|| preamble(name, &decoded))
+    uvspec(name, &decoded)
+        .or_else(|| tape7(name, &decoded))
+        .or_else(|| marks_of_thousands(name, &decoded))
+        .or_else(|| preamble(name, &decoded))
 }
 
 /// A complaint of the first row of numbers of which one has marks of thousands, whatever parts them.
@@ -128,8 +138,42 @@ fn uvspec(name: &str, text: &str) -> Option<Error> {
     is_so.then(|| Error::format(name, problem))
 }
 
-/// A complaint of lines that stand above the heading of a table, where there are any but one of units.
+/// A complaint of a file of MODTRAN as it stands, whose cards and columns of other quantities are none of a table of radiances.
+fn tape7(name: &str, text: &str) -> Option<Error> {
+    /// So many lines are looked at.
+    const LOOKED_AT: usize = 64;
+    let is_heading = |line: &str| {
+        let upper = line.to_ascii_uppercase();
+        let has = |word: &str| upper.contains(word);
+        (has("FREQ") || has("WAVLEN")) && (has("TOTAL_RAD") || has("TOTAL RAD") || has("TOT_TRANS") || has("TOT TRANS"))
+    };
+    let line = text.lines().take(LOOKED_AT).position(is_heading).filter(|line| *line > 0)? + 1;
+    let problem = format!(
+        "it looks like a tape7 of MODTRAN, with cards above its heading, line {line}; keep the columns FREQ and TOTAL_RAD as a table, \
+         headed as `freq (cm-1),radiance (W cm-2 sr-1 / cm-1)`"
+    );
+    Some(Error::format(name, problem))
+}
+
+/// A complaint of lines that stand above the heading of a table, where there are any but one of units; or of one above numbers that is
+/// no heading of theirs.
 fn preamble(name: &str, text: &str) -> Option<Error> {
+    let is_of_columns = |line: usize| {
+        let first = text.lines().nth(line - 1).and_then(|line| line.split([',', ';', '\t', ' ']).next());
+        first.is_some_and(is_of_wavelengths)
+    };
+    let title = delimited::title(text).filter(|([line, ..], _)| !is_of_columns(*line));
+    if let Some(([title, cells, columns], separator)) = title {
+        // Of words between blanks more is said already.
+        if separator == Separator::Blanks {
+            return None;
+        }
+        let cells = if cells == 1 { "1 cell".into() } else { format!("{cells} cells") };
+        let problem = format!(
+            "line {title} has {cells} above {columns} columns: put a # before it if it is a title, or name each column in it"
+        );
+        return Some(Error::format(name, problem));
+    }
     let [first, last, heading] = delimited::above_heading(text)?;
     let cells = |line: usize| -> Option<StringRecord> {
         Some(text.lines().nth(line - 1)?.split([',', ';', '\t']).map(str::trim).collect())
@@ -139,19 +183,29 @@ fn preamble(name: &str, text: &str) -> Option<Error> {
     }
     // Where what seems to be the heading stands below one of wavelengths, it is a row with a mistake, which is told by its place.
     let is_heading = |line: usize| {
-        let words = |line: &str| {
+        let first = |line: &str| {
             line.split([',', ';', '\t', ' ']).map(str::trim).find(|cell| !cell.is_empty()).map(str::to_owned)
         };
-        text.lines().nth(line - 1).and_then(words).is_some_and(|cell| names_wavelengths(&cell))
+        let line = text.lines().nth(line - 1).unwrap_or_default();
+        let parts = || line.split([',', ';', '\t']);
+        first(line).is_some_and(|cell| names_wavelengths(&cell))
+            || holds_wavelengths(parts())
+            || parts().count() > 1 && parts().any(|cell| is_of_wavelengths(cell.trim_matches(['"', ' '])))
     };
     if (first..=last).any(is_heading) && !is_heading(heading) {
         return None;
     }
-    let lines = if first == last { format!("line {first} stands") } else { format!("lines {first} to {last} stand") };
-    Some(Error::format(
-        name,
-        format!("{lines} above the heading of its columns, line {heading}; put a # before what is no table"),
-    ))
+    let lines = |last: usize| {
+        if first == last { format!("line {first} stands") } else { format!("lines {first} to {last} stand") }
+    };
+    // `>>>>>Begin Spectral Data<<<<<` is no heading.
+    let problem = match delimited::is_heading(text, heading) {
+        true => {
+            format!("{} above the heading of its columns, line {heading}; put a # before what is no table", lines(last))
+        }
+        false => format!("{} above its numbers; put a # before what is no table, and behind them too", lines(heading)),
+    };
+    Some(Error::format(name, problem))
 }
 
 #[cfg(test)]
@@ -223,12 +277,43 @@ mod tests {
                 "line 3: `12.345.678,25` has marks of thousands; write it as 12345678.25",
             ),
             ("nm L\n400 0.5\n410 1'234.5\n", "line 3: `1'234.5` has marks of thousands; write it as 1234.5"),
+            ("nm;L\n400;1 234,5\n410;2 345,6\n", "line 2: `1 234,5` has marks of thousands; write it as 1234.5"),
+            (
+                "nm;L (W m-2 sr-1 nm-1)\n400;999,5\n410;12 345\n",
+                "line 3: `12 345` has marks of thousands; write it as 12345",
+            ),
             ("nm,L\n400,\"1,234.5\"\n", "line 2, column 2: `1,234.5` has marks of thousands; write it as 1234.5"),
         ] {
             assert_eq!(complaint(text), format!("t: {place}, and so all numbers"), "{text}");
         }
         // One mark alone is that of decimals.
         assert_eq!(complaint("400;1.234\n410;2.345\n"), "read");
+    }
+
+    #[test]
+    fn files_of_instruments_and_models_are_told() {
+        for (text, wanted) in [
+            (
+                "Data from SKY.txt Node\n\nUser: lab\n>>>>>Begin Spectral Data<<<<<\n400.1\t1.2\n401.1\t1.3\n402.1\t1.4\n",
+                "t: lines 1 to 4 stand above its numbers; put a # before what is no table, and behind them too",
+            ),
+            (
+                "TF 4    2    2\n  1 2 0 3\n   FREQ   TOT_TRANS  TOTAL_RAD\n 12000.0 0.8 1e-7\n 12010.0 0.8 1e-7\n -9999.\n",
+                "t: it looks like a tape7 of MODTRAN, with cards above its heading, line 3; keep the columns FREQ and TOTAL_RAD",
+            ),
+            ("Sky at noon\n400,1\n410,2\n", "t: line 1 has 1 cell above 2 columns: put a # before it if it is a title"),
+            (
+                "Sky at noon\n400 1\n410 2\n",
+                "t: line 1: 3 words stand above 2 columns that are parted by blanks; put a # before it",
+            ),
+            ("Sky\n\n400;1,5\n410;2,5\n", "t: line 1 has 1 cell above 2 columns: put a # before it if it is a title"),
+            (
+                "400,1\n410,2\nmeasured at noon\n",
+                "t: line 3 has 1 cell, the rows above it have 2; put a # before it if it is no row",
+            ),
+        ] {
+            assert!(complaint(text).starts_with(wanted), "{text}: {}", complaint(text));
+        }
     }
 
     #[test]

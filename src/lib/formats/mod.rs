@@ -46,6 +46,7 @@ pub mod resume;
 pub mod sequence;
 mod settings;
 pub mod spectral;
+mod spectral_heading;
 pub mod stack;
 pub mod standard;
 pub mod stored_rows;

@@ -18,8 +18,9 @@ impl Comments {
         for line in delimited::comments(text).take(MAX_COMMENTS) {
             found.units.extend(units_in(line));
             found.other_quantity = found.other_quantity.or_else(|| other_quantity(line));
-            let counts =
-                |clause: &&str| ["wavelength", "wavenumber"].iter().any(|word| clause.to_lowercase().contains(word));
+            let counts = |clause: &&str| {
+                ["wavelength", "wavenumber", "photon energ"].iter().any(|word| clause.to_lowercase().contains(word))
+            };
             let mut clauses = line.split([',', ';']).filter(counts);
             let unit = clauses.find_map(|clause| WavelengthUnit::of_heading(clause.trim()).ok().flatten());
             found.wavelength = found.wavelength.or(unit);

@@ -70,6 +70,9 @@ pub(super) fn check_nm(wavelength_nm: &[f64]) -> std::result::Result<(), String>
 /// Below this they are no wavelengths of light in µm either.
 const SHORTEST_UM: f64 = 0.1;
 
+/// What people see, in nm.
+const SEEN_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
+
 /// Checks that wavelengths look like nm.
 fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
     let [first, .., last] = wavelength_nm else { return Ok(()) };
@@ -79,7 +82,13 @@ fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
         return Err(format!("{range}, which no light has; its first column must hold wavelengths"));
     }
     if *last < SHORTEST_NM {
-        return Err(format!("{range}, which looks like micrometers; {name} `wavelength_um`"));
+        let are_seen = |unit: WavelengthUnit| wavelength_nm.iter().any(|value| SEEN_NM.contains(&unit.nm(*value)));
+        let like = match [WavelengthUnit::Micrometer, WavelengthUnit::ElectronVolt].map(are_seen) {
+            [false, true] => "energies of photons in eV; name their unit in the heading, such as `energy_eV`".into(),
+            [true, true] => format!("micrometers, or energies of photons in eV; {name} `wavelength_um` or `energy_eV`"),
+            _ => format!("micrometers; {name} `wavelength_um`"),
+        };
+        return Err(format!("{range}, which looks like {like}"));
     }
     if *first > LONGEST_NM {
         return Err(format!(
@@ -91,12 +100,13 @@ fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
 
 /// Refuses wavelengths that no light has in the unit that is said of them, where all are those of light in another.
 pub(super) fn check_stated(wavelengths: &[f64], stated: WavelengthUnit) -> std::result::Result<(), String> {
-    const HEADINGS: [(WavelengthUnit, &str); 5] = [
+    const HEADINGS: [(WavelengthUnit, &str); 6] = [
         (WavelengthUnit::Nanometer, "wavelength_nm"),
         (WavelengthUnit::Micrometer, "wavelength_um"),
         (WavelengthUnit::Angstrom, "wavelength_angstrom"),
         (WavelengthUnit::PerCentimeter, "wavenumber_cm-1"),
         (WavelengthUnit::Meter, "wavelength_m"),
+        (WavelengthUnit::ElectronVolt, "energy_eV"),
     ];
     let are_seen = |unit: WavelengthUnit| {
         let is_seen = |value: &f64| (SHORTEST_NM..=LONGEST_NM).contains(&unit.nm(*value));

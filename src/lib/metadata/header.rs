@@ -213,7 +213,11 @@ impl FrameHeader {
 
     /// An [`Error::Order`] about this frame.
     pub fn out_of_order(&self, problem: impl Into<String>, first: &'static str) -> Error {
-        Error::Order { file: self.name.clone(), problem: problem.into(), first }
+        let (problem, takers) = (problem.into(), self.metadata.quantity.takers());
+        if !takers.is_empty() {
+            return self.refuse(format!("{problem}; it stands at the end of the chain, and goes into {takers}"));
+        }
+        Error::Order { file: self.name.clone(), problem, first }
     }
 
     /// The names of the first channels.

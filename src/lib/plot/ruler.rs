@@ -59,6 +59,15 @@ impl Ruler {
         self.high - self.low
     }
 
+    /// The values at both ends.
+    pub fn ends(&self) -> [f64; 2] {
+        [self.low, self.high].map(|place| match self.scale {
+            Scale::Linear => place,
+            Scale::Log10 => 10_f64.powf(place),
+            Scale::Reciprocal => -place.recip(),
+        })
+    }
+
     /// Where a value lies: 0 at the low end, 1 at the high one. `None` for what the axis cannot show.
     pub fn place(&self, value: f64) -> Option<f64> {
         Some((position(self.scale, value)? - self.low) / (self.high - self.low))
@@ -89,6 +98,24 @@ impl Ruler {
             Scale::Log10 => self.log_ticks(count),
             Scale::Reciprocal => self.reciprocal_ticks(count),
         }
+    }
+
+    /// The same between both ends, each of which is a tick with as many digits as tell them apart; others stand at least so far `apart`
+    /// from them.
+    pub fn ticks_between_ends(&self, count: f64, apart: f64) -> Vec<Tick> {
+        let [from, to] = self.ends();
+        let labels = end_labels(from, to, self.scale != Scale::Linear);
+        let mut ticks = self.ticks(count);
+        for (place, label) in [0.0, 1.0].into_iter().zip(labels) {
+            // A round number at the end is written as those beside it.
+            let same = ticks.iter().any(|tick| tick.label.is_some() && (tick.place - place).abs() < 1e-6);
+            if !same {
+                ticks.retain(|tick| (tick.place - place).abs() >= apart);
+                ticks.push(Tick { place, label: Some(label) });
+            }
+        }
+        ticks.sort_by(|a, b| a.place.total_cmp(&b.place));
+        ticks
     }
 
     fn tick(&self, value: f64, label: Option<String>) -> Option<Tick> {
@@ -131,7 +158,15 @@ impl Ruler {
     /// Round numbers, the roundest first, each where it has room beside those before.
     fn reciprocal_ticks(&self, count: f64) -> Vec<Tick> {
         const DIGITS: [f64; 9] = [1.0, 2.0, 5.0, 3.0, 4.0, 1.5, 6.0, 8.0, 2.5];
-        let [lowest, highest] = [self.low, self.high].map(|place| (-place).max(1.0 / LARGEST).recip().log10());
+        /// Numbers this much alike are as good as evenly spread.
+        const NARROW: f64 = 1.5;
+        let [from, to] = [self.low, self.high].map(|place| (-place).max(1.0 / LARGEST).recip());
+        if to < NARROW * from {
+            let values = round_values(from, to, count);
+            let labels = plain_labels(&values);
+            return values.iter().zip(labels).filter_map(|(value, label)| self.tick(*value, Some(label))).collect();
+        }
+        let [lowest, highest] = [from, to].map(f64::log10);
         #[expect(clippy::cast_possible_truncation, reason = "logarithms within ±100")]
         let decades = (lowest - 1e-9).floor() as i32..=(highest + 1e-9).floor() as i32;
         let apart = count.max(1.0).recip();
@@ -180,30 +215,80 @@ fn round_values(low: f64, high: f64, count: f64) -> Vec<f64> {
     values.take_while(|value| *value <= high + 1e-9 * step).collect()
 }
 
+/// Whether a number has no digits below that which a step begins with.
+fn is_whole(step: f64, number: f64) -> bool {
+    if step <= 0.0 || step.is_nan() {
+        return true;
+    }
+    let parts = number / 10_f64.powi(decade_of(step));
+    (parts - parts.round()).abs() < 1e-9 * parts
+}
+
 /// Labels for equally spaced values, with as many digits as tell them apart.
 fn plain_labels(values: &[f64]) -> Vec<String> {
     let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
     let step = match values {
         [first, second, ..] => second - first,
-        _ => largest,
+        // One alone is a multiple of a power of ten too, though not of that it begins with: 2.5·10⁸.
+        _ => (0..16).map(|digit| largest / 10_f64.powi(digit)).find(|step| is_whole(*step, largest)).unwrap_or(largest),
     };
     if !(step > 0.0 && largest > 0.0) {
         return values.iter().map(|value| minus(&format!("{value}"))).collect();
     }
+    let [magnitude, unit] = [largest, step].map(decade_of);
+    values.iter().map(|value| written(*value, magnitude, unit)).collect()
+}
+
+/// The power of ten that a number above 0 begins with.
+fn decade_of(value: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "logarithms of doubles are within ±324")]
-    let (magnitude, unit) = ((largest.log10() + 1e-9).floor() as i32, (step.log10() + 1e-9).floor() as i32);
+    let decade = (value.log10() + 1e-9).floor() as i32;
+    decade
+}
+
+/// A number in digits down to the power of ten `unit`, beside others up to that of `magnitude`.
+fn written(value: f64, magnitude: i32, unit: i32) -> String {
     let digits = |below: i32| usize::try_from(below).unwrap_or(0);
-    let label = |value: &f64| {
-        if *value == 0.0 {
-            "0".into()
-        } else if (-3..6).contains(&magnitude) {
-            minus(&format!("{value:.*}", digits(-unit)))
-        } else {
-            let mantissa = value / 10_f64.powi(magnitude);
-            minus(&format!("{mantissa:.*}·{}", digits(magnitude - unit), power_of_ten(magnitude)))
-        }
-    };
-    values.iter().map(label).collect()
+    if value == 0.0 {
+        "0".into()
+    } else if (-3..6).contains(&magnitude) {
+        minus(&format!("{value:.*}", digits(-unit)))
+    } else {
+        let mantissa = value / 10_f64.powi(magnitude);
+        minus(&format!("{mantissa:.*}·{}", digits(magnitude - unit), power_of_ten(magnitude)))
+    }
+}
+
+/// The ends of a range, to a hundredth of the first digit of their distance; where they are `of_many_sizes`, each also to three digits of
+/// its own. Zeros that all have behind the point are left out.
+pub fn end_labels(low: f64, high: f64, of_many_sizes: bool) -> [String; 2] {
+    let (span, largest) = (high - low, low.abs().max(high.abs()));
+    if !(span > 0.0 && span.is_finite()) {
+        return [low, high].map(|value| minus(&value.to_string()));
+    }
+    let shared = decade_of(span) - 2;
+    let [low, high] = [low, high].map(|value| match of_many_sizes && value != 0.0 {
+        false => written(value, decade_of(largest), shared),
+        true => written(value, decade_of(value.abs()), shared.min(decade_of(value.abs()) - 2)),
+    });
+    let zeros = [&low, &high].map(|label| zeros_behind_point(label));
+    match zeros {
+        [Some(a), Some(b)] if !of_many_sizes => [without_zeros(&low, a.min(b)), without_zeros(&high, a.min(b))],
+        [a, b] => [without_zeros(&low, a.unwrap_or(0)), without_zeros(&high, b.unwrap_or(0))],
+    }
+}
+
+/// How many zeros end the digits behind the point of a number, before a power of ten; none of one without a point.
+fn zeros_behind_point(label: &str) -> Option<usize> {
+    let (_, behind) = label.split('·').next().unwrap_or_default().split_once('.')?;
+    Some(behind.len() - behind.trim_end_matches('0').len())
+}
+
+/// A number without so many of the zeros that end its digits behind the point.
+fn without_zeros(label: &str, count: usize) -> String {
+    let (digits, power) = label.split_at(label.find('·').unwrap_or(label.len()));
+    let kept = digits.get(..digits.len() - count).unwrap_or(digits);
+    format!("{}{power}", kept.strip_suffix('.').unwrap_or(kept))
 }
 
 /// Logarithmic axes between these powers of ten have plain numbers, all others powers.
@@ -255,6 +340,8 @@ mod tests {
         let axis = |low, high| Axis::linear("").range(low, high);
         assert_eq!(labels(&axis(0.0, 10.0), 6.0), ["0", "2", "4", "6", "8", "10"]);
         assert_eq!(labels(&axis(-0.3, 0.2), 5.0), ["−0.3", "−0.2", "−0.1", "0", "0.1", "0.2"]);
+        assert_eq!(labels(&axis(2.4996e8, 2.5004e8), 1.0), ["2.5·10⁸"]);
+        assert_eq!(labels(&axis(0.1221, 0.1279), 2.0), ["0.125"]);
         assert_eq!(labels(&axis(980.0, 1022.0), 4.0), ["980", "1000", "1020"]);
         assert_eq!(labels(&axis(0.0, 2e6), 4.0), ["0", "0.5·10⁶", "1.0·10⁶", "1.5·10⁶", "2.0·10⁶"]);
         assert_eq!(labels(&axis(0.0, 2e-5), 2.0), ["0", "1·10⁻⁵", "2·10⁻⁵"]);
@@ -279,11 +366,62 @@ mod tests {
     fn reciprocal_ticks_are_round_and_apart() {
         let axis = |low, high| Axis { scale: Scale::Reciprocal, ..Axis::linear("").range(low, high) };
         assert_eq!(labels(&axis(1000.0, 1e6), 8.0), ["1000", "1500", "2000", "3000", "10000"]);
+        assert_eq!(labels(&axis(5590.0, 5632.0), 5.0), ["5590", "5600", "5610", "5620", "5630"]);
         let ruler = Ruler::new(&axis(2000.0, 10_000.0), std::iter::empty());
         // Mired: 500 to 100, of which 250 are 4000 K.
         assert!((ruler.place(4000.0).unwrap() - 250.0 / 400.0).abs() < 1e-12);
         assert_eq!([ruler.place(0.0), ruler.place(-5.0), ruler.place_within(-5.0)], [None, None, Some(0.0)]);
         assert_eq!(labels(&axis(0.1, 0.4), 4.0), ["0.1", "0.2", "0.4"]);
+    }
+
+    /// Whatever the range, both ends have numbers, and these differ by what the range does, to 1 %.
+    #[test]
+    fn ends_are_told_apart() {
+        let value = |label: &str| -> f64 {
+            let raised = |c: char| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().position(|digit| digit == c).map(|digit| digit.to_string());
+            let (digits, power) = label.split_once("·10").unwrap_or((label, "⁰"));
+            let power: String = power.chars().map(|c| raised(c).unwrap_or_else(|| "-".into())).collect();
+            format!("{}e{power}", digits.replace('−', "-")).parse().unwrap()
+        };
+        let scales = [Scale::Linear, Scale::Log10, Scale::Reciprocal];
+        for scale in scales {
+            for middle in [-4e9, -512.25, -1e-5, 0.0, 3e-12, 0.31, 5600.0, 65_535.0, 1e8, 2.5e30] {
+                for part in [1e-7, 3.3e-5, 0.0127, 0.4, 1.0, 30.0] {
+                    let room = if middle == 0.0 { part } else { part * f64::abs(middle) };
+                    let (low, high) = match scale {
+                        Scale::Linear => (middle - room, middle + room),
+                        _ if middle <= 0.0 => continue,
+                        _ => (middle / (1.0 + part), middle * (1.0 + part)),
+                    };
+                    let ruler = Ruler::new(&Axis { scale, ..Axis::linear("").range(low, high) }, std::iter::empty());
+                    let ticks = ruler.ticks_between_ends(5.0, 0.1);
+                    let [first, .., last] = ticks.as_slice() else { panic!("{ticks:?}") };
+                    assert_eq!([first.place, last.place].map(f64::round), [0.0, 1.0]);
+                    let [from, to] = [first, last].map(|tick| tick.label.as_deref().unwrap());
+                    let off = [value(from) - low, value(to) - high].map(|off| f64::abs(off) / (high - low));
+                    assert!(off.iter().all(|off| *off <= 0.0051), "{low} to {high}: {from} to {to}");
+                    // Numbers on a bar stand apart.
+                    let places: Vec<f64> = ticks.iter().filter(|t| t.label.is_some()).map(|tick| tick.place).collect();
+                    assert!(
+                        scale == Scale::Log10 || places.windows(2).all(|pair| pair[1] - pair[0] > 0.05),
+                        "{ticks:?}"
+                    );
+                }
+            }
+        }
+        for (low, high, wanted) in [
+            (0.0, 10.0, ["0", "10"]),
+            (3.0, 17.0, ["3", "17"]),
+            (-0.5, 0.25, ["−0.50", "0.25"]),
+            (4875.123, 4875.143, ["4875.123", "4875.143"]),
+            (4875.31, 9123.77, ["4875", "9124"]),
+            (0.0, 65_535.0, ["0", "65535"]),
+            (-2e9, 2e9, ["−2·10⁹", "2·10⁹"]),
+            (1.0e-7, 1.2341e-7, ["1.000·10⁻⁷", "1.234·10⁻⁷"]),
+        ] {
+            assert_eq!(end_labels(low, high, false), wanted);
+        }
+        assert_eq!(end_labels(0.01, 12_345.6, true), ["0.01", "12346"]);
     }
 
     #[test]

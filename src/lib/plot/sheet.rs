@@ -52,7 +52,8 @@ pub struct ScaleBar {
 impl ScaleBar {
     fn ruler(&self) -> Ruler {
         let axis = Axis { label: String::new(), scale: self.scale, range: Some(self.range) };
-        Ruler::new(&axis, std::iter::empty())
+        // A range too narrow to be one is that about its numbers.
+        Ruler::new(&axis, [self.range.0, self.range.1].into_iter())
     }
 
     /// The color of each finite number, beyond the ends that of the nearest; of others `missing`.
@@ -244,10 +245,7 @@ impl Bar {
         let height = height.max(size.of(LEAST_BAR)).round();
         let ruler = meaning.ruler();
         let most = (height / size.of(2.6 * TEXT)).clamp(3.0, 12.0);
-        // One number says nothing of the others.
-        let enough = |ticks: &Vec<Tick>| ticks.len() > 1;
-        let mut closer = (0..10).map(|more| ruler.ticks(most + f64::from(more)));
-        let ticks = closer.find(enough).unwrap_or_else(|| ruler.ticks(most));
+        let ticks = ruler.ticks_between_ends(most, size.of(LINE) / height);
         let widest = ticks.iter().filter_map(|tick| tick.label.as_deref()).map(|label| size.width(label));
         let widest = widest.chain(meaning.missing.iter().map(|(_, name)| size.width(name))).fold(0.0, f64::max);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few pixels")]

@@ -6,6 +6,9 @@ use super::spelling::{Base, Token, base, tokens};
 /// What the heading of a column says about the unit of its numbers; a name such as `irradiance` counts where there is no
 /// unit, and what stands in brackets where it looks like one.
 pub fn unit_of_heading(heading: &str) -> Option<Stated> {
+    if let Some(kind) = changed(heading) {
+        return Some(Stated::Other { text: heading.trim().to_owned(), kind });
+    }
     let found = of_name_and_unit(heading)?;
     let contradicts = match &found {
         Stated::Radiance(_) => names(heading, &IRRADIANCES) && !names(heading, &RADIANCE) || names(heading, &PHOTONS),
@@ -21,6 +24,23 @@ pub fn unit_of_heading(heading: &str) -> Option<Stated> {
         false => found,
     })
 }
+
+/// What was made of radiances by the words of a heading: `log10(L)`, `sqrt radiance`, `normalized radiance`.
+fn changed(heading: &str) -> Option<OtherUnit> {
+    const FUNCTIONS: [&str; 5] = ["log", "ln", "lg", "sqrt", "root"];
+    const SIGNS: [&str; 4] = ["√", "^0.5", "^(1/2)", "**0.5"];
+    let tokens = tokens(heading);
+    let is_one = |token: &Token| token.lower().is_some_and(|word| FUNCTIONS.contains(&word.as_str()));
+    // Of something: `log` alone, or `log 3`, is a name.
+    let has_argument = |place: usize| matches!(tokens.get(place + 1), Some(Token::Factor { .. }));
+    let is_function = tokens.iter().enumerate().any(|(place, token)| is_one(token) && has_argument(place));
+    if is_function || SIGNS.iter().any(|sign| heading.contains(sign)) {
+        return Some(OtherUnit::Function);
+    }
+    names(heading, &NORMALIZED).then_some(OtherUnit::Relative)
+}
+
+const NORMALIZED: [&str; 2] = ["normalized", "normalised"];
 
 /// What a unit, or a name, is that is made of no powers of light.
 fn by_name(text: &str) -> OtherUnit {
@@ -183,10 +203,7 @@ fn names_unit_in_words(heading: &str) -> bool {
 }
 
 /// Words that multiply.
-const FACTORS_IN_WORDS: [&str; 18] = [
-    "log",
-    "log10",
-    "ln",
+const FACTORS_IN_WORDS: [&str; 15] = [
     "times",
     "scaled",
     "multiplied",
@@ -323,7 +340,6 @@ mod tests {
             format!("1e3 * radiance ({UNIT})"),
             format!("L 10^-3 ({UNIT})"),
             format!("L x 10⁻³ ({UNIT})"),
-            format!("log10 radiance ({UNIT})"),
             format!("radiance, scaled by 100 ({UNIT})"),
             format!("radiance x1000, {UNIT}"),
             format!("radiance (x10^-3 {UNIT})"),
@@ -347,6 +363,35 @@ mod tests {
         for name in ["sky 30", "sky1", "x1", "sza 45 az 90", "site 3.5", "2024-05-01", "(a) 12:30", "L_e", "12e"] {
             let heading = format!("{name} [{UNIT}]");
             assert_eq!(unit_of_heading(&heading), RadianceUnit::parse(UNIT).map(Stated::Radiance), "{heading}");
+        }
+    }
+
+    #[test]
+    fn what_was_made_of_radiances_is_told() {
+        const UNIT: &str = "W m-2 sr-1 nm-1";
+        for name in [
+            "sqrt radiance",
+            "log radiance",
+            "ln(L)",
+            "log10(radiance)",
+            "log_radiance",
+            "√L",
+            "radiance^0.5",
+            "Log10 L",
+        ] {
+            for heading in [name.to_owned(), format!("{name} ({UNIT})")] {
+                let wanted = Stated::Other { text: heading.clone(), kind: OtherUnit::Function };
+                assert_eq!(unit_of_heading(&heading), Some(wanted));
+            }
+        }
+        for heading in
+            ["normalized radiance", "L, normalised", "radiance_normalized", "normalized radiance (W m-2 sr-1 nm-1)"]
+        {
+            let wanted = Stated::Other { text: heading.into(), kind: OtherUnit::Relative };
+            assert_eq!(unit_of_heading(heading), Some(wanted));
+        }
+        for name in ["log", "log 3", "log1", "blog radiance", "ln"] {
+            assert_eq!(unit_of_heading(name), None, "{name}");
         }
     }
 

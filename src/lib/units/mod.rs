@@ -27,6 +27,8 @@ pub const ELEMENTARY_CHARGE_C: f64 = 1.602_176_634e-19;
 pub const BOLTZMANN_EV_PER_K: f64 = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C;
 /// Maximum luminous efficacy K_m in lm W⁻¹.
 pub const LUMINOUS_EFFICACY_LM_PER_W: f64 = 683.0;
+/// Wavelength in vacuum times the energy of its photons, h c, in nm eV.
+pub const NM_EV: f64 = PLANCK_J_S * LIGHT_M_PER_S / ELEMENTARY_CHARGE_C / M_PER_NM;
 /// Meters in a nanometer.
 pub const M_PER_NM: f64 = 1e-9;
 /// Nanometers in a centimeter.
@@ -133,6 +135,16 @@ impl QuantityKind {
             Self::Xyy => "1, 1, cd m-2",
             Self::Cct => "K, 1, cd m-2",
             Self::Lab | Self::Luv | Self::Srgb | Self::LinearSrgb | Self::ColorDifference => "1",
+        }
+    }
+
+    /// The programs that take what ends the chain, colors and what is made of them; nothing of what a stage before it holds.
+    pub fn takers(self) -> &'static str {
+        match self {
+            Self::Xyz => "`to-xyz --space`, `color-difference`, `measure` and `preview`",
+            Self::Xyy | Self::Lab => "`color-difference`, `measure` and `preview`",
+            Self::Luv | Self::Cct | Self::Srgb | Self::LinearSrgb | Self::ColorDifference => "`measure` and `preview`",
+            Self::Unspecified | Self::SpectralRadiance | Self::ExpectedElectrons | Self::Electrons | Self::Adu => "",
         }
     }
 

@@ -47,9 +47,9 @@ impl RadianceUnit {
         self.power.in_w() / self.wavelength.in_nm(wavelength_nm) / in_cm2
     }
 
-    /// Whether it is per interval of wavenumber.
+    /// Whether it is per interval of wavenumber, or of the energy of photons.
     pub fn is_per_wavenumber(self) -> bool {
-        self.wavelength == WavelengthUnit::PerCentimeter
+        self.wavelength.is_of_energy()
     }
 
     /// Reads a unit that is all of a text.
@@ -68,7 +68,11 @@ impl RadianceUnit {
 impl fmt::Display for RadianceUnit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let interval = self.wavelength.symbol();
-        let interval = if self.is_per_wavenumber() { format!("/ {interval}") } else { format!("{interval}-1") };
+        let interval = if self.wavelength == WavelengthUnit::PerCentimeter {
+            format!("/ {interval}")
+        } else {
+            format!("{interval}-1")
+        };
         write!(f, "{} {}-2 sr-1 {interval}", self.power.symbol(), self.area.symbol())
     }
 }
@@ -120,6 +124,8 @@ pub enum OtherUnit {
     Reading,
     /// Of no scale: arbitrary units, relative values.
     Relative,
+    /// A logarithm or a root of radiance.
+    Function,
     /// None that is known.
     Unknown,
 }
@@ -147,6 +153,7 @@ impl OtherUnit {
             Self::Ratio => "a ratio, not the radiance itself",
             Self::Reading => "what an instrument reads, not what that means",
             Self::Relative => "of no scale, which does not tell how bright the light is",
+            Self::Function => "a logarithm or a root, not the radiance itself",
             Self::Unknown => "no unit of spectral radiance that is known",
         }
     }
@@ -167,6 +174,7 @@ impl OtherUnit {
                 "multiply each value, as a fraction of 1, by the radiance that a perfect white, or no filter, has in the same light"
             }
             Self::Reading => "multiply each value by the calibration of the instrument",
+            Self::Function => "of log10 take 10^value, of ln e^value, of sqrt value^2",
             Self::PerCentimeter
             | Self::Scaled
             | Self::BesideFactor
@@ -279,8 +287,18 @@ pub(super) fn units_among(tokens: &[Token]) -> Vec<Found> {
 
 /// What a product of factors is: a unit of spectral radiance, or what else.
 fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
-    let Dimensions { power, energy, has_photons, has_others, per_sr, time, per_frequency, per_wavenumber, mut lengths } =
-        Dimensions::of(tokens);
+    let Dimensions {
+        power,
+        energy,
+        has_photons,
+        has_others,
+        per_sr,
+        time,
+        per_frequency,
+        per_wavenumber,
+        per_ev,
+        mut lengths,
+    } = Dimensions::of(tokens);
     if has_photons {
         return Err(OtherUnit::Photons);
     }
@@ -302,6 +320,11 @@ fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
             Ok(RadianceUnit { power, area: *area, wavelength: WavelengthUnit::PerCentimeter })
         }
         _ if per_wavenumber => Err(OtherUnit::PerFrequency),
+        (-1, [(area, -2)]) if per_ev == -1 && is_area(*area) => {
+            Ok(RadianceUnit { power, area: *area, wavelength: WavelengthUnit::ElectronVolt })
+        }
+        (0, [(area, -2)]) if per_ev == -1 && is_area(*area) => Err(OtherUnit::Irradiance),
+        _ if per_ev != 0 => Err(OtherUnit::Unknown),
         (-1, [(area, -2), (length, -1)]) if is_area(*area) => {
             Ok(RadianceUnit { power, area: *area, wavelength: interval(*length)? })
         }
@@ -343,6 +366,8 @@ struct Dimensions {
     time: i32,
     per_frequency: bool,
     per_wavenumber: bool,
+    /// The exponent of the energy of photons in eV.
+    per_ev: i32,
     /// Each length with its exponent.
     lengths: Vec<(Length, i32)>,
 }
@@ -389,6 +414,7 @@ impl Dimensions {
             Some(Base::Frequency) => self.per_frequency = true,
             Some(Base::Energy(unit)) => self.energy = Some(unit),
             Some(Base::Time) => self.time += exponent,
+            Some(Base::ElectronVolt) => self.per_ev += exponent,
             None => self.has_others = true,
         }
     }

@@ -250,6 +250,8 @@ pub(super) enum Base {
     SolidAngle,
     Time,
     Frequency,
+    /// The energy of photons, of which an interval divides.
+    ElectronVolt,
 }
 
 pub(super) fn base(word: &str) -> Option<Base> {
@@ -277,6 +279,7 @@ pub(super) fn base(word: &str) -> Option<Base> {
         "sr" | "str" | "ster" | "steradian" => Base::SolidAngle,
         "s" | "sec" | "second" => Base::Time,
         "hz" | "thz" => Base::Frequency,
+        "ev" | "electronvolt" => Base::ElectronVolt,
         _ => return None,
     })
 }

@@ -1,7 +1,7 @@
 //! Units of wavelength.
 
-use super::NM_PER_CM;
 use super::spelling::{Base, Length, Token, base, tokens};
+use super::{NM_EV, NM_PER_CM};
 use std::fmt;
 
 /// The unit in which a file gives wavelengths.
@@ -17,6 +17,8 @@ pub enum WavelengthUnit {
     Meter,
     /// cm⁻¹: wavenumbers instead, of which wavelengths in vacuum follow.
     PerCentimeter,
+    /// eV: energies of photons instead, of which wavelengths in vacuum follow.
+    ElectronVolt,
 }
 
 impl WavelengthUnit {
@@ -27,10 +29,12 @@ impl WavelengthUnit {
             Self::Angstrom => Length::Angstrom.symbol(),
             Self::Meter => Length::Meter.symbol(),
             Self::PerCentimeter => "cm-1",
+            Self::ElectronVolt => "eV",
         }
     }
 
-    /// What an interval of one such unit at a wavelength in nm is in nm: of wavenumbers |dλ/dν| = λ²/10⁷.
+    /// What an interval of one such unit at a wavelength in nm is in nm: of wavenumbers |dλ/dν| = λ²/10⁷, of energies
+    /// |dλ/dE| = λ²/(h c).
     pub(super) fn in_nm(self, wavelength_nm: f64) -> f64 {
         match self {
             Self::Nanometer => 1.0,
@@ -38,6 +42,7 @@ impl WavelengthUnit {
             Self::Angstrom => 0.1,
             Self::Meter => 1e9,
             Self::PerCentimeter => wavelength_nm * wavelength_nm / NM_PER_CM,
+            Self::ElectronVolt => wavelength_nm * wavelength_nm / NM_EV,
         }
     }
 
@@ -48,8 +53,14 @@ impl WavelengthUnit {
         match self {
             Self::Nanometer => value,
             Self::PerCentimeter => NM_PER_CM / value,
+            Self::ElectronVolt => NM_EV / value,
             _ => (value * self.in_nm(1.0) * PARTS).round() / PARTS,
         }
+    }
+
+    /// Whether it counts what is inverse to wavelength, proportional to the energy of photons.
+    pub fn is_of_energy(self) -> bool {
+        matches!(self, Self::PerCentimeter | Self::ElectronVolt)
     }
 
     /// The unit that the heading of a column of wavelengths ends with: `wavelength (nm)`, `lambda_um`, `nu (cm-1)`; none where
@@ -77,8 +88,15 @@ impl WavelengthUnit {
         if words().any(|word| matches!(word.as_str(), "freq" | "frequency")) {
             return Err("frequencies (if they are wavenumbers, as MODTRAN calls them, write `FREQ (cm-1)`)");
         }
-        if words().any(|word| matches!(word.as_str(), "ev" | "energy")) {
-            return Err("energies of photons");
+        if words().any(|word| matches!(word.as_str(), "mev" | "kev")) {
+            return Err("energies of photons in another unit than eV");
+        }
+        if matches!(tokens.last(), Some(Token::Factor { word, exponent: None }) if base(word) == Some(Base::ElectronVolt))
+        {
+            return Ok(Some(Self::ElectronVolt));
+        }
+        if words().any(|word| matches!(word.as_str(), "ev" | "energy" | "energies")) {
+            return Err("energies of photons without the unit eV (write it as in `energy_eV`)");
         }
         Ok(match tokens.last() {
             Some(Token::Factor { exponent: Some(-1), .. }) => return Err("wavenumbers without the unit cm-1"),
@@ -125,19 +143,32 @@ mod tests {
             ("k [cm^-1]", Some(WavelengthUnit::PerCentimeter)),
             ("wavenumber_cm-1", Some(WavelengthUnit::PerCentimeter)),
             ("1/cm", Some(WavelengthUnit::PerCentimeter)),
+            ("energy_eV", Some(WavelengthUnit::ElectronVolt)),
+            ("Photon energy [eV]", Some(WavelengthUnit::ElectronVolt)),
+            ("E/eV", Some(WavelengthUnit::ElectronVolt)),
+            ("eV", Some(WavelengthUnit::ElectronVolt)),
             ("wavelength", None),
             ("A", None),
             ("id", None),
         ] {
             assert_eq!(WavelengthUnit::of_heading(heading), Ok(unit), "{heading}");
         }
-        for heading in
-            ["wavenumber", "wavenumber (um-1)", "frequency (THz)", "FREQ", "energy_eV", "wavelength (cm)", "lambda_mm"]
-        {
+        for heading in [
+            "wavenumber",
+            "wavenumber (um-1)",
+            "frequency (THz)",
+            "FREQ",
+            "energy",
+            "E (keV)",
+            "wavelength (cm)",
+            "lambda_mm",
+        ] {
             assert!(WavelengthUnit::of_heading(heading).is_err(), "{heading}");
         }
         assert_eq!(WavelengthUnit::Micrometer.nm(0.57), 570.0);
         assert_eq!(WavelengthUnit::Angstrom.nm(5550.0), 555.0);
+        // h c = 1.239 841 984… eV µm, CODATA 2018.
+        assert!((WavelengthUnit::ElectronVolt.nm(2.0) - 619.920_992).abs() < 1e-6);
         // The sodium D2 line in vacuum, NIST ASD: 589.158 nm, 16 973.37 cm⁻¹.
         assert!((WavelengthUnit::PerCentimeter.nm(16_973.37) - 589.158).abs() < 5e-4);
     }

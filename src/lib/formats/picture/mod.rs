@@ -52,7 +52,8 @@ pub struct PictureSettings {
 /// Reads a frame and writes it as a PNG.
 ///
 /// Electrons and ADU are shown plane by plane, R as red and so on, with the sRGB curve; XYZ in its colors under the
-/// white that its metadata name; sRGB as it is. In false color numbers run along [`ramp`], and a bar says which is which.
+/// white that its metadata name; sRGB as it is. Of a map, of color differences or color temperatures, the first is shown in false color
+/// where no plane is named. In false color numbers run along [`ramp`], and a bar says which is which.
 ///
 /// # Errors
 ///
@@ -116,8 +117,9 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
     if settings.zoom <= 1 && !is_alone {
         settings.fit = settings.fit.or(Some(THUMBNAIL));
     }
-    let is_told = settings.plane.is_some() || settings.false_color || is_alone;
-    let choice = if is_told || shade::is_picture(&frame, settings.range) {
+    let is_map = settings.plane.is_none() && Choice::is_of_map(&frame);
+    let is_told = !is_map && (settings.plane.is_some() || settings.false_color || is_alone);
+    let choice = if is_told || !is_map && shade::is_picture(&frame, settings.range) {
         Choice::of(&frame, settings.plane.as_deref(), settings.false_color)?
     } else {
         settings.false_color = true;
@@ -185,13 +187,18 @@ struct Shown {
 impl Shown {
     fn of(source: &mut dyn RowSource, settings: &PictureSettings) -> Result<Self> {
         let frame = source.header().clone();
-        let choice = Choice::of(&frame, settings.plane.as_deref(), settings.false_color)?;
-        let reduction = reduction(&frame, settings, &choice)?;
+        let is_map = settings.plane.is_none() && Choice::is_of_map(&frame);
+        let settings = PictureSettings { false_color: settings.false_color || is_map, ..settings.clone() };
+        let choice = match is_map {
+            true => Choice::leading(&frame),
+            false => Choice::of(&frame, settings.plane.as_deref(), settings.false_color)?,
+        };
+        let reduction = reduction(&frame, &settings, &choice)?;
         let reduced = Reduced::read(source, &reduction, &choice, None)?;
         if !reduced.has_numbers() {
             return Err(shade::nothing(&frame));
         }
-        Self::paint(&frame, settings, &choice, &reduced)
+        Self::paint(&frame, &settings, &choice, &reduced)
     }
 
     fn paint(frame: &FrameHeader, settings: &PictureSettings, choice: &Choice, reduced: &Reduced) -> Result<Self> {

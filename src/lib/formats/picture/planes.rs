@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::frame::bare_name;
 use crate::metadata::FrameHeader;
 use crate::names::place_of;
+use crate::plot::end_labels;
 use crate::stages::saturation::MASK_LAYER;
 use crate::units::{QuantityKind, typeset};
 
@@ -31,16 +32,18 @@ impl Choice {
             return match channels.len() {
                 1 => Ok(all(&[0])),
                 n if is_one => Err(Error::Usage(format!(
-                    "{}: it holds {}; false color shows one of its {n} planes; say with --plane which: {}",
+                    "{}: it holds {}; false color shows one of its {n} planes, {}; say which, as with --plane {}",
                     frame.name,
                     frame.holds(),
-                    known(frame)
+                    known(frame),
+                    Self::leading(frame).names(frame)[0]
                 ))),
                 3 if frame.has_three_planes() => Ok(all(&[0, 1, 2])),
                 _ => Err(frame.refuse(format!(
-                    "it holds {}, which makes no picture; show one with --plane, of {}",
+                    "it holds {}, which makes no picture; show one, of {}, in false color, as with --plane {} --false-color",
                     frame.holds(),
-                    known(frame)
+                    known(frame),
+                    Self::leading(frame).names(frame)[0]
                 ))),
             };
         };
@@ -60,8 +63,16 @@ impl Choice {
     /// The plane that says most of a frame, for one that is no picture as it is: its luminance or lightness, or the first.
     pub fn leading(frame: &FrameHeader) -> Self {
         let place = |name: &str| (0..frame.geometry.channels.len()).find(|place| plane_name(frame, *place) == name);
-        let place = place("Y").or_else(|| place("L")).unwrap_or(0);
-        Self { channels: vec![place], filter: None }
+        let place = match frame.metadata.quantity {
+            QuantityKind::Cct => place("CCT"),
+            _ => place("Y").or_else(|| place("L")),
+        };
+        Self { channels: vec![place.unwrap_or(0)], filter: None }
+    }
+
+    /// Whether a frame is a map of quantities, of which the first is looked for and no color is made.
+    pub fn is_of_map(frame: &FrameHeader) -> bool {
+        matches!(frame.metadata.quantity, QuantityKind::ColorDifference | QuantityKind::Cct)
     }
 
     /// What reports call the channels that are shown.
@@ -216,6 +227,14 @@ pub(super) fn stage(frame: &FrameHeader, choice: &Choice, [width, height]: [usiz
     format!("{}{unit}, {width} × {height}", frame.holds())
 }
 
+/// Two numbers of which the second is larger, each `written` in five digits, or in as many as tell them apart.
+pub(super) fn apart(low: f64, high: f64, written: fn(f64) -> String) -> [String; 2] {
+    /// So much of the larger five digits tell to a hundredth.
+    const TOLD: f64 = 0.01;
+    let is_narrow = high > low && high - low < TOLD * low.abs().max(high.abs());
+    if is_narrow { end_labels(low, high, false) } else { [low, high].map(written) }
+}
+
 /// A level in five digits at most: 4095 where that is all of it.
 pub(super) fn level(value: f64) -> String {
     let shown = rounded(value);
@@ -309,6 +328,8 @@ mod tests {
         {
             assert_eq!(level(number), wanted);
         }
+        assert_eq!(apart(5000.12, 5000.14, level), ["5000.12", "5000.14"]);
+        assert_eq!(apart(1757.31, 4095.0, level), ["1757.3", "4095"]);
         let frame = frame(QuantityKind::Xyy, &["R", "G", "B"]);
         let (all, one) = (Choice::of(&frame, None, false).unwrap(), Choice::leading(&frame));
         assert_eq!(stage(&frame, &all, [4, 3]), "three planes of xyY / 1, 1, cd m⁻², 4 × 3");

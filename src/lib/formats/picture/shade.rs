@@ -1,6 +1,6 @@
 //! From samples to gray and color.
 
-use super::planes::{Choice, level, rounded};
+use super::planes::{Choice, apart, level, rounded};
 use super::reduce::Reduced;
 use crate::color::{D65_XY, linear_srgb_from_xyz, srgb_decode, srgb_encode, xyz_of_chromaticity};
 use crate::error::{Error, Result};
@@ -72,12 +72,12 @@ impl Shade {
                 let ends = reduced.quantiles_of_all([low, high]).ok_or_else(none)?;
                 Self::planes(frame, vec![ends.into(); reduced.planes])
             }
-            Range::Full => Self::full(frame, reduced),
+            Range::Full => Self::full(frame, choice, reduced),
         }
     }
 
     /// From what no light reads to the most that the stage can hold.
-    fn full(frame: &FrameHeader, reduced: &Reduced) -> Result<Self> {
+    fn full(frame: &FrameHeader, choice: &Choice, reduced: &Reduced) -> Result<Self> {
         let metadata = &frame.metadata;
         let extremes = || {
             (0..reduced.planes)
@@ -123,7 +123,8 @@ impl Shade {
             }
             other => {
                 return Err(frame.refuse(format!(
-                    "{other} is no picture; give --range LOW,HIGH, or show one plane with --plane and --false-color"
+                    "{other} is no picture; give --range LOW,HIGH, or show one plane in false color, as with --plane {} --false-color",
+                    choice.names(frame)[0]
                 )));
             }
         };
@@ -171,16 +172,20 @@ impl Shade {
         match self {
             Self::Planes(ranges) if ranges.iter().all(|range| *range == ranges[0]) => {
                 let (low, high) = ranges[0];
-                Some(format!("black {}, white {}{unit}", level(low), level(high)))
+                let [low, high] = apart(low, high, level);
+                Some(format!("black {low}, white {high}{unit}"))
             }
             Self::Planes(ranges) => {
-                let range =
-                    |(name, (low, high)): (&String, &(f64, f64))| format!("{name} {} to {}", level(*low), level(*high));
+                let range = |(name, (low, high)): (&String, &(f64, f64))| {
+                    let [low, high] = apart(*low, *high, level);
+                    format!("{name} {low} to {high}")
+                };
                 let ranges: Vec<String> = names.iter().zip(ranges).map(range).collect();
                 Some(format!("black to white: {}{unit}", ranges.join(", ")))
             }
             Self::Xyz(_, (low, high)) if (*low, *high) != (0.0, 1.0) => {
-                Some(format!("black {}, white {}{unit}", level(*low), level(*high)))
+                let [low, high] = apart(*low, *high, level);
+                Some(format!("black {low}, white {high}{unit}"))
             }
             Self::Xyz(..) | Self::Encoded => {
                 let color = frame.metadata.color.as_ref()?;
@@ -268,13 +273,12 @@ pub(super) fn all_outside(
         ends = [ends[0].min(least), ends[1].max(most)];
     }
     let (low, high) = range?;
-    let [least, most] = ends.map(rounded);
+    let [least, most] = apart(ends[0], ends[1], rounded);
+    let [low, high] = apart(low, high, level);
     Some(format!(
-        "{}: all numbers, from {least} to {most}, lie outside the range from {} to {}, which shows nothing of them; give another \
-         with --range",
-        frame.name,
-        level(low),
-        level(high)
+        "{}: all numbers, from {least} to {most}, lie outside the range from {low} to {high}, which shows nothing of them; give \
+         another with --range",
+        frame.name
     ))
 }
 
@@ -354,7 +358,8 @@ pub(super) fn beyond(reduced: &Reduced, (low, high): (f64, f64), range: Range) -
         _ => String::new(),
     };
     let is_beyond = least < low || most > high;
-    is_beyond.then(|| format!("{ends}lowest {}, highest {}", rounded(least), rounded(most)))
+    let [least, most] = apart(least, most, rounded);
+    is_beyond.then(|| format!("{ends}lowest {least}, highest {most}"))
 }
 
 /// The ends of the numbers of a single plane; of one that is the same everywhere, half of it to both sides.

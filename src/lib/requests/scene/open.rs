@@ -75,7 +75,7 @@ impl Scene {
             });
         }
         found.notes.extend(overfull(&light, loaded.sensor.readout.as_ref(), self.level.expose_to, exposure.exposure_s));
-        found.notes.extend(found.metadata.quadrature_error.map(inexact));
+        found.notes.extend(found.metadata.quadrature_error.map(|error| inexact(error, self.wavelengths.is_some())));
         Ok(Prepared { sensor: loaded.sensor, exposure, light, brightest_e, found })
     }
 
@@ -243,14 +243,19 @@ fn overfull(light: &Light, readout: Option<&ReadOut>, expose_to: Option<f64>, ex
     })
 }
 
-/// What the sum over wavelengths is off by, of R, G and B.
-fn inexact([red, green, blue]: [f64; 3]) -> Note {
+/// What the sum over wavelengths is off by, of R, G and B, where these are `chosen` or not.
+fn inexact([red, green, blue]: [f64; 3], chosen: bool) -> Note {
     let [r, g, b] = [red, green, blue].map(|error| in_digits(error, 2));
     let text = format!(
         "the sum over wavelengths is off by {r} of R, {g} of G, {b} of B from the integral between all samples"
     );
     if [red, green, blue].iter().any(|error| *error > TOLD_ERROR) {
-        Note::Warning(format!("{text}; a smaller step of --wavelengths, or its default, brings it closer"))
+        // Not every program that opens a scene has the option.
+        let remedy = match chosen {
+            true => "a smaller step of --wavelengths, or its default, brings",
+            false => "a smaller step, as of `render-radiance --wavelengths 360:830:0.5`, brings",
+        };
+        Note::Warning(format!("{text}; {remedy} it closer"))
     } else {
         Note::Remark(text)
     }

@@ -76,7 +76,7 @@ impl<'a> Sums<'a> {
         if beyond > TOLD_BEYOND {
             notes.push(Note::Warning(format!(
                 "{:.1} % of the response of the sensor {} lies beyond {start_nm} to {end_nm} nm, where nothing is summed; \
-                 --wavelengths sets other ends",
+                 `render-radiance --wavelengths` sets other ends",
                 100.0 * beyond,
                 self.loaded.sensor.name
             )));

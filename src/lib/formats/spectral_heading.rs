@@ -1,0 +1,308 @@
+//! Headings of tables that are wavelengths, with or without words about them: `400`, `400nm`, `lambda_400`; and first columns that count
+//! rows.
+
+use super::cells::numeric;
+use super::delimited;
+use crate::error::{Error, Result};
+use crate::spectrum::SHORTEST_NM;
+use crate::units::WavelengthUnit;
+use csv::StringRecord;
+use ndarray::{Array2, ArrayView1};
+
+/// Whether a cell is the heading of a column of wavelengths, or of what people give instead.
+pub(super) fn names_wavelengths(cell: &str) -> bool {
+    let lower = cell.to_lowercase();
+    ["wavelength", "lambda", "λ", "wave", "wl", "nm"].iter().any(|begin| lower.starts_with(begin))
+        || !matches!(WavelengthUnit::of_heading(cell), Ok(None))
+}
+
+/// Whether cells have two wavelengths with words about them.
+pub(super) fn holds_wavelengths<'a>(cells: impl Iterator<Item = &'a str>) -> bool {
+    cells.filter_map(|cell| Label::of(cell.trim())).nth(1).is_some()
+}
+
+/// The wavelengths of a heading behind its first cell.
+#[derive(Debug, PartialEq)]
+pub(super) struct Wavelengths {
+    pub(super) values: Vec<f64>,
+    /// Their unit, where each has it.
+    pub(super) unit: Option<WavelengthUnit>,
+}
+
+/// The wavelengths of a heading above rows of spectra, of which `below` is the first cell of the first; none of another heading.
+///
+/// # Errors
+///
+/// [`Error::Format`] naming a cell that is none where most others are, or a heading without a name before them.
+pub(super) fn wavelengths(name: &str, line: u64, heading: &StringRecord, below: &str) -> Result<Option<Wavelengths>> {
+    let numbers: Option<Vec<f64>> = heading.iter().skip(1).map(numeric).collect();
+    if let Some(values) = numbers.filter(|values| values.len() > 1) {
+        return Ok(Some(Wavelengths { values, unit: None }));
+    }
+    // Under a heading of wavelengths these stand below it.
+    let labels: Vec<Option<Label>> = heading.iter().map(Label::of).collect();
+    let known = labels.iter().skip(1).flatten();
+    let Some(usual) = known.clone().next().filter(|_| !(names_wavelengths(&heading[0]) && numeric(below).is_some()))
+    else {
+        return Ok(None);
+    };
+    let is_alike = |label: &Option<Label>| label.as_ref().is_some_and(|label| label.is_alike(usual));
+    let like: Vec<f64> = known.filter(|label| label.is_alike(usual)).map(|label| label.value).collect();
+    let goes_one_way = like.windows(2).all(|pair| pair[0] < pair[1]) || like.windows(2).all(|pair| pair[0] > pair[1]);
+    if like.len() < 2 || !goes_one_way || 3 * like.len() < 2 * (heading.len() - 1) {
+        return Ok(None);
+    }
+    let refuse = |problem: String| Err(Error::format(name, problem));
+    if let Some(column) = (1..heading.len()).find(|column| !is_alike(&labels[*column])) {
+        let shown = &heading[column];
+        let others =
+            heading.iter().zip(&labels).skip(1).find(|(_, label)| is_alike(label)).map_or("", |(cell, _)| cell);
+        return refuse(format!(
+            "line {line}, column {}: `{shown}` is no wavelength as the others are, such as `{others}`; mend it, or leave the column out: \
+             one name stands before the values of each row",
+            column + 1
+        ));
+    }
+    if is_alike(&labels[0]) {
+        return refuse(
+            "its first row holds wavelengths, and its rows are spectra without names; begin each with a name, and the first with a \
+             word, as in `name,400nm,410nm`"
+                .into(),
+        );
+    }
+    Ok(Some(Wavelengths { values: like, unit: usual.unit }))
+}
+
+/// A wavelength with words about it.
+#[derive(Debug)]
+struct Label {
+    /// What stands before it, without marks.
+    before: String,
+    value: f64,
+    unit: Option<WavelengthUnit>,
+}
+
+impl Label {
+    /// What a cell such as `400nm`, `lambda_400`, `L(400 nm)` holds: behind it a unit, or before it a word for wavelengths.
+    fn of(cell: &str) -> Option<Self> {
+        /// What people call wavelengths, and what R puts before a number that is to be a name.
+        const WORDS: [&str; 8] = ["wavelength", "wave", "lambda", "λ", "wl", "wvl", "nm", "x"];
+        /// Beyond this no radiance is measured by wavelength.
+        const LONGEST_NM: f64 = 1e5;
+        let begin = cell.find(|c: char| c.is_ascii_digit())?;
+        let is_mark = |c: char| c.is_whitespace() || "_-.:=([".contains(c);
+        let before = cell[..begin].trim_matches(is_mark).to_lowercase();
+        let length = cell[begin..].find(|c: char| !(c.is_ascii_digit() || ".,".contains(c)));
+        let (number, behind) = cell[begin..].split_at(length.unwrap_or(cell.len() - begin));
+        let behind = behind.trim_start_matches('_').trim_end_matches([')', ']']).trim();
+        let value = numeric(number)?;
+        let unit = if behind.is_empty() { None } else { Some(WavelengthUnit::of_heading(behind).ok()??) };
+        let nm = unit.unwrap_or(WavelengthUnit::Nanometer).nm(value);
+        let is_named = unit.is_some() || WORDS.contains(&before.as_str());
+        (is_named && (SHORTEST_NM..=LONGEST_NM).contains(&nm)).then_some(Self { before, value, unit })
+    }
+
+    /// Whether another is written in the same way.
+    fn is_alike(&self, other: &Self) -> bool {
+        self.before == other.before && self.unit == other.unit
+    }
+}
+
+/// Whether a heading names wavelengths, and no radiance per nm.
+pub(super) fn is_of_wavelengths(cell: &str) -> bool {
+    let word = cell.trim().to_lowercase();
+    ["wl", "nm", "wave", "λ"].contains(&word.as_str())
+        || ["wavelength", "lambda", "wl_", "wl ", "wl(", "wl["].iter().any(|begin| word.starts_with(begin))
+}
+
+/// Whether wavelengths stand in the second column, behind one that counts the rows.
+pub(super) fn is_behind_index(heading: &StringRecord, numbers: &Array2<f64>) -> bool {
+    numbers.ncols() > 2
+        && heading.len() > 2
+        && !names_wavelengths(&heading[0])
+        && is_of_wavelengths(&heading[1])
+        && counts_rows(numbers.column(0))
+}
+
+/// Refuses a header that names wavelengths in another column than the first, or in two.
+pub(super) fn check_first_column(name: &str, header: &StringRecord) -> Result<()> {
+    let mut places = (0..header.len()).filter(|place| is_of_wavelengths(&header[*place]));
+    let refuse = |problem: String| Err(Error::format(name, problem));
+    match (places.next(), places.next()) {
+        (None | Some(0), None) => Ok(()),
+        (Some(0), Some(second)) => refuse(format!(
+            "its columns 1 and {} both name wavelengths, `{}`; leave out the second, or part it into two tables where they differ",
+            second + 1,
+            header[second].trim()
+        )),
+        (Some(place), _) => refuse(format!(
+            "its wavelengths, `{}`, stand in column {}; they must be the first column",
+            header[place].trim(),
+            place + 1
+        )),
+        (None, Some(_)) => Ok(()),
+    }
+}
+
+/// Whether a first column counts the rows, from 0 or 1 on.
+fn counts_rows(first: ArrayView1<f64>) -> bool {
+    /// Fewer may be anything.
+    const LEAST: usize = 3;
+    first.len() >= LEAST
+        && matches!(first.first(), Some(0.0 | 1.0))
+        && first.windows(2).into_iter().all(|pair| pair[1] == pair[0] + 1.0)
+}
+
+/// A complaint of a table without a unit of wavelengths whose first column counts its rows.
+pub(super) fn refuse_index(name: &str, numbers: &Array2<f64>) -> Result<()> {
+    if !counts_rows(numbers.column(0)) {
+        return Ok(());
+    }
+    let second: Vec<f64> = numbers.columns().into_iter().nth(1).map(|column| column.to_vec()).unwrap_or_default();
+    let goes_one_way =
+        second.windows(2).all(|pair| pair[0] < pair[1]) || second.windows(2).all(|pair| pair[0] > pair[1]);
+    let advice = match goes_one_way && numbers.ncols() > 2 && second.iter().all(|nm| *nm >= SHORTEST_NM) {
+        true => {
+            "its wavelengths seem to stand in the second: leave out the first, or head both, as in `No.,wavelength_nm` \
+                 (a line behind a # is a comment)"
+        }
+        false => "wavelengths are wanted there",
+    };
+    Err(Error::format(
+        name,
+        format!(
+            "its first column counts its rows, {} to {}; {advice}",
+            numbers[(0, 0)],
+            numbers[(numbers.nrows() - 1, 0)]
+        ),
+    ))
+}
+
+/// The names behind that of the wavelengths in the comment next above the rows of a table without a heading, where it has one for each of
+/// its `width` columns, as libRadtran and Python's `savetxt` write headings.
+pub(super) fn in_comment(text: &str, width: usize) -> Option<StringRecord> {
+    let row = delimited::rows(text).next()?;
+    let above: Vec<&str> = text.lines().take_while(|line| !std::ptr::eq(*line, row)).collect();
+    let above = above.join("\n");
+    let comment = delimited::comments(&above).filter(|comment| !comment.trim().is_empty()).last()?;
+    let by_mark = |mark: char| comment.split(mark).map(str::trim).collect::<Vec<_>>();
+    let parted = [
+        by_mark('\t'),
+        by_mark(';'),
+        by_mark(','),
+        delimited::bracketed(comment),
+        comment.split_whitespace().collect(),
+    ];
+    let cells = parted.into_iter().find(|cells| cells.len() == width && is_of_wavelengths(cells[0]))?;
+    Some(cells.into_iter().skip(1).collect())
+}
+
+/// A record without its first cell.
+pub(super) fn without_first(record: &StringRecord) -> StringRecord {
+    record.iter().skip(1).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::formats::csv::SpectralTable;
+
+    const UNIT: &str = "# radiance in W m-2 sr-1 nm-1";
+
+    fn complaint(text: &str) -> String {
+        SpectralTable::parse("t", text.as_bytes()).map_or_else(|error| error.to_string(), |_| "read".into())
+    }
+
+    #[test]
+    fn rows_are_spectra_under_wavelengths_as_people_write_them() {
+        for text in [
+            "name,400nm,500nm,600nm\na,1,2,3\nb,4,5,6\n",
+            "name,400 nm,500 nm,600 nm\na,1,2,3\nb,4,5,6\n",
+            "id;lambda_400;lambda_500;lambda_600\n1;1,0;2,0;3,0\n2;4,0;5,0;6,0\n",
+            "site\twl400.0\twl500.0\twl600.0\na\t1\t2\t3\nb\t4\t5\t6\n",
+            "name,X400,X500,X600\na,1,2,3\nb,4,5,6\n",
+            "name,0.4um,0.5um,0.6um\na,1,2,3\nb,4,5,6\n",
+            "name,L(400 nm),L(500 nm),L(600 nm)\na,1,2,3\nb,4,5,6\n",
+            "wavelength,400nm,500nm,600nm\na,1,2,3\nb,4,5,6\n",
+            "name;400,0nm;500,0nm;600,0nm\na;1;2;3\nb;4;5;6\n",
+            "name,600nm,500nm,400nm\na,3,2,1\nb,6,5,4\n",
+            "name 400nm 500nm 600nm\na 1 2 3\nb 4 5 6\n",
+        ] {
+            let table = SpectralTable::parse("t", format!("{UNIT}\n{text}").as_bytes())
+                .unwrap_or_else(|error| panic!("{text}: {error}"));
+            assert_eq!(table.wavelength_nm, [400.0, 500.0, 600.0], "{text}");
+            assert_eq!(table.values.iter().copied().collect::<Vec<_>>(), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "{text}");
+        }
+        // Columns named by a wavelength of something else, beside one of wavelengths.
+        let excited = SpectralTable::parse("t", b"wavelength_nm,ex350nm,ex360nm\n400,1,2\n500,3,4\n").unwrap();
+        assert_eq!((excited.columns[0].as_str(), excited.wavelength_nm.len()), ("ex350nm", 2));
+    }
+
+    #[test]
+    fn headings_that_are_wavelengths_but_for_some_are_told() {
+        for (text, wanted) in [
+            (
+                "name,400nm,5O0nm,600nm,700nm\na,1,2,3,4\n",
+                "line 1, column 3: `5O0nm` is no wavelength as the others are, such as `400nm`",
+            ),
+            (
+                "# x\nid,site,400nm,500nm,600nm\n1,a,1,2,3\n",
+                "line 2, column 2: `site` is no wavelength as the others are, such as `400nm`",
+            ),
+            ("400nm,500nm,600nm\n1,2,3\n4,5,6\n", "its rows are spectra without names"),
+            ("id,site,400,500,600\n1,a,1,2,3\n", "line 1, column 2: `site` is no wavelength, as the others are"),
+        ] {
+            assert!(complaint(text).contains(wanted), "{text}: {}", complaint(text));
+        }
+    }
+
+    #[test]
+    fn a_comment_above_numbers_names_their_columns() {
+        for (text, names) in [
+            ("# lambda edir uu\n400 1 2\n410 1 2\n", "edir uu"),
+            ("# made by x\n# wavelength (nm), L [W m-2 sr-1 nm-1], M\n\n400,1.5,2\n410,1,2\n", "L [W m-2 sr-1 nm-1] M"),
+            ("% lambda (nm)  L (W m-2 sr-1 nm-1)\n400 1\n410 2\n", "L (W m-2 sr-1 nm-1)"),
+            ("# wavelength, radiance\n400 1 2\n410 1 2\n", "column1 column2"),
+            ("# lambda a b\n# 3 spectra measured\n400 1 2\n410 1 2\n", "column1 column2"),
+            ("400 1 2\n410 1 2\n# lambda a b\n", "column1 column2"),
+        ] {
+            let table = SpectralTable::parse("t", text.as_bytes()).unwrap();
+            assert_eq!(table.columns.join(" "), names, "{text}");
+            assert_eq!(table.column_index(Some("column1")).unwrap(), 0);
+        }
+        let table = SpectralTable::parse("t", b"# lambda edir uu\n400 1 2\n410 1 2\n").unwrap();
+        assert!(table.radiance_unit(0, None).unwrap_err().to_string().contains("`edir`, an irradiance"));
+    }
+
+    #[test]
+    fn columns_that_count_rows_are_no_wavelengths() {
+        for text in [
+            "No.,wavelength,L\n1,400,1\n2,500,2\n3,600,3\n",
+            "index;wl;L\n0;400;1\n1;500;2\n2;600;3\n",
+            ",wavelength_nm,L\n0,400,1\n1,500,2\n2,600,3\n",
+            "id,wave,L\n1,400,1\n2,500,2\n3,600,3\n",
+            "pixel,lambda,L\n,nm,W m-2 sr-1 nm-1\n1,400,1\n2,500,2\n3,600,3\n",
+            "n lambda_um L\n1 0.4 1\n2 0.5 2\n3 0.6 3\n",
+        ] {
+            let table = SpectralTable::parse("t", text.as_bytes()).unwrap_or_else(|error| panic!("{text}: {error}"));
+            assert_eq!(table.wavelength_nm, [400.0, 500.0, 600.0], "{text}");
+            assert_eq!(
+                (table.columns, table.values.into_raw_vec_and_offset().0),
+                (vec!["L".to_owned()], vec![1.0, 2.0, 3.0])
+            );
+        }
+        for (text, wanted) in [
+            (
+                "#,wavelength,L\n1,400,0.1\n2,500,0.2\n3,600,0.3\n",
+                "t: its first column counts its rows, 1 to 3; its wavelengths seem",
+            ),
+            ("0 400 1\n1 500 2\n2 600 3\n", "t: its first column counts its rows, 0 to 2; its wavelengths seem"),
+            ("a,b\n1,0.4\n2,0.5\n3,0.6\n", "t: its first column counts its rows, 1 to 3; wavelengths are wanted there"),
+            ("id,wavelength,L\n7,400,1\n3,500,2\n9,600,3\n", "t: its wavelengths, `wavelength`, stand in column 2"),
+            ("time,wavelength,L\n12:00,400,1\n12:00,500,2\n", "t: its wavelengths, `wavelength`, stand in column 2"),
+            ("wavelength,a,wavelength,b\n400,1,400,2\n500,2,500,3\n", "t: its columns 1 and 3 both name wavelengths"),
+            ("No.,wavelength,L\n1,4O0,1\n2,500,2\n3,600,3\n", "t: line 2, column 2: `4O0` is no number"),
+        ] {
+            assert!(complaint(text).starts_with(wanted), "{text}: {}", complaint(text));
+        }
+    }
+}
