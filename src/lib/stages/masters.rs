@@ -107,12 +107,22 @@ struct Level {
 }
 
 impl Level {
+    /// Takes in samples, in lanes of their own so that one sum need not wait for another.
     fn take(&mut self, samples: &[f32]) {
-        for sample in samples.iter().map(|sample| f64::from(*sample)).filter(|sample| sample.is_finite()) {
-            self.count += 1.0;
-            self.sum += sample;
-            self.squares += sample * sample;
+        const LANES: usize = 8;
+        let mut lanes = [[0.0_f64; LANES]; 3];
+        for chunk in samples.chunks(LANES) {
+            for (lane, sample) in chunk.iter().enumerate() {
+                let (one, sample) = if sample.is_finite() { (1.0, f64::from(*sample)) } else { (0.0, 0.0) };
+                lanes[0][lane] += one;
+                lanes[1][lane] += sample;
+                lanes[2][lane] += sample * sample;
+            }
         }
+        let [count, sum, squares] = lanes.map(|lane| lane.iter().sum::<f64>());
+        self.count += count;
+        self.sum += sum;
+        self.squares += squares;
     }
 }
 
