@@ -546,7 +546,8 @@ fn options_that_are_named_exist() {
 }
 
 /// What the parts of the library belong to: their texts name options that all these programs have.
-const OWNERS: [(&str, &[&str]); 15] = [
+const OWNERS: [(&str, &[&str]); 16] = [
+    ("src/lib/requests/scene/layout.rs", &["render-radiance"]),
     ("src/lib/requests/scene/picture.rs", &["render-radiance"]),
     ("src/lib/requests/scene/illuminated.rs", &["render-radiance"]),
     ("src/lib/requests/scene", &["render-radiance", "predict-noise"]),

@@ -180,4 +180,19 @@ fn levels_far_from_the_bias_of_a_sensor_that_is_named_are_told() {
         let said = shop.said("correct-frame light.fits --sensor s.yaml --dark dark.fits -o c.exr", 0);
         assert_eq!(said.contains("ADU at least"), is_told, "{level}: {said}");
     }
+    // A level that the file tells is held against it too.
+    for (black, is_told) in [(0, true), (480, false), (4000, true)] {
+        let metadata = format!("schema: cyanometer/1\nquantity: adu\ncfa: rggb\nblack_level_adu: {black}\n");
+        fs::write(shop.path("light.fits.yaml"), metadata).unwrap();
+        let auto = format!("light.fits: its black level, {black} ADU, is far from the bias of s, 500 ADU");
+        let option = format!("light.fits: --black {black} is far from the bias of s, 500 ADU");
+        for (line, told) in [
+            ("demosaic light.fits -o rgb.exr".to_owned(), &auto),
+            ("correct-frame light.fits --black auto -o c.exr".to_owned(), &auto),
+            (format!("demosaic light.fits --black {black} -o rgb.exr"), &option),
+        ] {
+            let said = shop.said(&format!("{line} --sensor s.yaml"), 0);
+            assert_eq!(said.contains(told), is_told, "{line}: {said}");
+        }
+    }
 }

@@ -5,6 +5,7 @@
 
 mod support;
 
+use cyanometer::frame::to_sample;
 use std::fs;
 use support::fits::{chance, write_fits};
 use support::workshop::{BAD_DATA, Workshop};
@@ -150,4 +151,49 @@ fn a_white_level_that_is_said_is_one_of_codes_as_they_come() {
         "correct-frame light.raw --raw 384x32:u16le --cfa rggb --white 4095 --black 100 --sensor s.yaml --linearize";
     let said = shop.said(&format!("{line} --flat flat.raw -o out.exr"), 0);
     assert!(!said.contains("saturated"), "{said}");
+}
+
+/// Dark signals of 9600 and 500 ADU in 240 s are those of a sensor of 40 and of 2 e⁻/s, as far as it is named.
+#[test]
+fn dark_signals_that_the_sensor_predicts_are_not_doubted() {
+    let shop = Workshop::new();
+    let metadata =
+        "schema: cyanometer/1\nquantity: adu\ncamera: A\ncfa: rggb\nexposure_time_s: 240\nblack_level_adu: 500\n";
+    fs::write(shop.path("light.fits.yaml"), format!("{metadata}white_level_adu: 16383\n")).unwrap();
+    let line = "correct-frame light.fits --dark dark.fits -o out.exr";
+    let cases = [
+        (9600.0, 40.0, "60 % of the way from black to white"),
+        (500.0, 2.0, "ADU, 2 times its black level; are these of another number of bits"),
+    ];
+    for (dark, dark_current_e_per_s, doubt) in cases {
+        write(&shop, "light.fits", [300.0, dark], 1, &[]);
+        write(&shop, "dark.fits", [0.0, dark], 2, &[("EXPTIME", "240.0")]);
+        let told = shop.said(line, 0);
+        assert!(told.contains(doubt), "{told}");
+        for (current, is_told) in [(dark_current_e_per_s, false), (0.1 * dark_current_e_per_s, true)] {
+            write_sensor(&shop, current);
+            let told = shop.said(&format!("{line} --sensor s.yaml"), 0);
+            assert_eq!(told.contains(doubt), is_told, "{dark}, {current}: {told}");
+        }
+    }
+}
+
+/// A dark frame less its bias has samples below zero: of sums of two numbers from -5 to 5, 45 % once they are whole.
+#[test]
+fn darks_without_their_bias_are_told_by_samples_below_zero() {
+    let shop = Workshop::new();
+    let write = |name: &str, level: f64, scatter: f64, seed: u64| {
+        let [width, height] = SIZE;
+        let sample = |x: u32, y: u32| to_sample((level + scatter * chance(x, y, seed)).round());
+        let samples = (0..height).flat_map(|y| (0..width).flat_map(move |x| sample(x, y).to_le_bytes()));
+        fs::write(shop.path(name), samples.collect::<Vec<u8>>()).unwrap();
+    };
+    write("light.raw", 1700.0, 30.0, 1);
+    let line = "correct-frame light.raw --raw 384x32:f32le --cfa rggb --white 16383 --dark dark.raw -o out.exr";
+    for (level, is_told) in [(0.0, true), (10.0, false), (500.0, false)] {
+        write("dark.raw", level, 10.0, 2);
+        let told = shop.said(line, 0);
+        let doubt = "dark.raw: 45 % of its samples are below zero, as no camera writes them; was a bias taken off?";
+        assert_eq!(told.contains(doubt), is_told, "{level}: {told}");
+    }
 }

@@ -485,7 +485,7 @@ fn darks_of_other_sensors_or_lit_scenes_are_refused() {
     let frame = taken(100.0, 1);
     assert!(corrected(&frame, &taken(0.0, 1)).unwrap().warnings().is_empty());
     refused(corrected(&frame, &taken(0.0, 2)), "its sensor seed is 2, but that of test is 1");
-    refused(corrected(&frame, &taken(50.0, 1)), "its scene, test, was lit");
+    refused(corrected(&frame, &taken(50.0, 1)), "its scene, `test`, was lit");
     let mut other = taken(0.0, 1);
     other.metadata.sensor.as_mut().unwrap().name = "other".into();
     refused(corrected(&frame, &other), "its sensor is other, but that of test is kaf-5101ce");

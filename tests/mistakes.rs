@@ -589,7 +589,7 @@ const MISTAKES: [(&str, i32, &str); 132] = [
     (
         "correct-frame codes.exr --dark lit.exr",
         BAD_DATA,
-        "lit.exr: its scene, --electrons, was lit; a dark frame is taken without light, as `render-radiance --dark` renders it",
+        "lit.exr: its scene, `--electrons`, was lit; a dark frame is taken without light, as `render-radiance --dark` renders it",
     ),
     (
         "to-xyz rgb.exr --matrix matrix.yaml --black 5",

@@ -441,6 +441,70 @@ fn saturation_is_said_to_be_of_photosites_or_of_the_converter() {
     assert!(kinds.iter().all(|count| *count > 1), "{kinds:?}");
 }
 
+/// Flats and darks of a camera at such a black level, whose exposure time sets the light, each flat beside darks of its time; of every flat a
+/// tenth of the charge is that of the dark.
+fn lit_by_time(readout: &ReadOut, index: u32) -> [Vec<Level>; 2] {
+    let end = readout.full_well_e;
+    let current = readout.dark_current_e_per_s.unwrap();
+    let levels = |is_lit: bool| -> Vec<Level> {
+        let shares = [0.003, 0.01, 0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
+        (0..)
+            .zip(shares)
+            .map(|(place, share)| {
+                let lit_e = if is_lit { 0.9 * share * end } else { 0.0 };
+                let condition = Condition {
+                    is_lit,
+                    exposure_s: Some(0.1 * share * end / current),
+                    photons: is_lit.then_some(lit_e / QUANTUM_EFFICIENCY),
+                    temperature_k: None,
+                };
+                let first = 4 * place + if is_lit { 0 } else { 100 };
+                level((readout, index, Shake::default()), condition, lit_e, [4, first])
+            })
+            .collect()
+    };
+    [levels(true), levels(false)]
+}
+
+/// Cameras of black level 0, where exposure time sets the light and the shortest darks are clipped: these are left out, which is said, and
+/// the gain lies within its interval as often as is stated, though a tenth of all charge is that of the dark; so it does where all darks are
+/// said to be clipped. No clipped dark is taken for a flat.
+#[test]
+fn clipped_darks_do_not_change_the_gain() {
+    let found: Vec<[Option<bool>; 2]> = (0..40_u32)
+        .into_par_iter()
+        .map(|index| {
+            let plain = camera(index, Kind::Ccd);
+            let full_well_e = 20_000.0;
+            let readout = ReadOut {
+                bits: 14,
+                bias_adu: 0.0,
+                adu_per_e: 0.5,
+                full_well_e,
+                read_noise_e: 8.0,
+                dark_current_e_per_s: Some(500.0),
+                ..plain
+            };
+            let [flats, darks] = lit_by_time(&readout, index);
+            let of_others = found(&flats, &darks);
+            assert!(of_others.notes.iter().any(|note| note.contains("clipped at code 0 and left out")), "{index}");
+            assert!(!of_others.suspects.iter().any(|suspect| suspect.problem.contains("are they flats")), "{index}");
+            let clipped: Vec<Level> = darks.iter().map(|dark| Level { at_ends: [0.0, 0.3], ..dark.clone() }).collect();
+            let of_none = found(&flats, &clipped);
+            assert!(of_none.get("dark_current_e_per_s").is_none(), "{index}");
+            [of_others, of_none].map(|found| {
+                let gain = found.get("gain_adu_per_e")?;
+                // By a tenth it was too large.
+                assert!((gain.value / readout.adu_per_e - 1.0).abs() < 0.04, "{index}: {gain:?}");
+                Some((gain.low..=gain.high).contains(&readout.adu_per_e))
+            })
+        })
+        .collect();
+    for (place, which) in ["others", "none"].into_iter().enumerate() {
+        check_misses(which, found.iter().map(|held| held[place]));
+    }
+}
+
 /// An uncertainty of all numbers of photons together is one of what they tell, however many levels there are.
 #[test]
 fn an_error_of_all_photons_does_not_average_out() {

@@ -135,3 +135,59 @@ fn stuck_photosites_are_named_and_left_out() {
     places.sort_unstable();
     assert_eq!(places, STUCK.map(|([x, y], _)| [x as u64, y as u64]));
 }
+
+/// Six hot photosites of 19 200, two of each class, are no part of what a sensor file has of all others: of rows and columns, of which one
+/// in a column of 60 makes 16 e-, of PRNU and of the pattern of the dark. Bounds are 3 standard deviations and more of patterns of so many rows,
+/// columns and photosites.
+#[test]
+fn sensor_files_have_hot_photosites_apart() {
+    const SENSOR: &str = "schema: cyanometer-sensor/2\nname: drawn\nreadout:\n  width: 160\n  height: 120\n  cfa: grbg\n  \
+                          full_well_e: 12000\n  dark_current_e_per_s: 10\n  temperature_k: 298\n  dcnu: 0.2\n  prnu: 0.008\n  \
+                          prnu_row: 0.002\n  prnu_column: 0.003\n  dsnu_e: 1.5\n  dsnu_row_e: 0.5\n  dsnu_column_e: 0.8\n  \
+                          read_noise_e: 4.1\n  bits: 12\n  bias_adu: 128\n  adu_per_e: 0.25\n";
+    const HOT: [[usize; 2]; 6] = [[20, 20], [61, 41], [31, 50], [91, 80], [40, 31], [120, 95]];
+    /// Codes per second: 2000 e-.
+    const EXCESS: f32 = 500.0;
+    let shop = Workshop::new();
+    std::fs::write(shop.path("drawn.yaml"), SENSOR).unwrap();
+    std::fs::create_dir(shop.path("frames")).unwrap();
+    let lit = |level: u32, frames: u32| (format!("--electrons {level},{level},{level}"), 0.5_f32, frames);
+    let mut stacks = vec![lit(8000, 8)];
+    stacks.extend([200, 1000, 2500, 4000, 5500, 7000].map(|level| lit(level, 2)));
+    stacks.extend([(0.01, 4), (0.5, 8), (2.0, 4)].map(|(time, frames)| ("--dark".to_owned(), time, frames)));
+    let mut number = 0;
+    for (light, exposure_s, frames) in stacks {
+        for _ in 0..frames {
+            number += 1;
+            let name = format!("frames/{number}.exr");
+            shop.pipe(&format!(
+                "render-radiance --sensor drawn.yaml {light} --exposure {exposure_s} --size 160x120 | mosaic | add-noise --frame {number} | \
+                 digitize -o {name}"
+            ));
+            let mut taken = shop.frame(&name);
+            for [x, y] in HOT {
+                taken.samples[y * 160 + x] += (EXCESS * exposure_s).round();
+            }
+            shop.write(&name, &taken.header, &taken.samples);
+        }
+    }
+    let told = shop.attempt("photon-transfer frames --sensor-out measured.yaml -q", &[]);
+    assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
+    let text = std::fs::read_to_string(shop.path("measured.yaml")).unwrap();
+    let number = |key: &str| -> f64 {
+        let own = text.lines().find_map(|line| line.strip_prefix(&format!("  {key}: ")));
+        own.unwrap_or_else(|| panic!("no {key} in {text}")).parse().unwrap()
+    };
+    for (key, truth, share) in [
+        ("dsnu_row_e", 0.5, 0.4),
+        ("dsnu_column_e", 0.8, 0.35),
+        ("dsnu_e", 1.5, 0.2),
+        ("prnu", 0.008, 0.1),
+        ("dark_current_e_per_s", 10.0, 0.1),
+        ("dcnu", 0.2, 0.2),
+    ] {
+        let own = number(key);
+        assert!((own / truth - 1.0).abs() < share, "{key}: {own}, {truth}");
+    }
+    assert!(number("hot_pixel_share") > 0.0 && number("hot_pixel_dark_current_e_per_s") > 1000.0, "{text}");
+}

@@ -232,6 +232,8 @@ fn a_raw_brings_its_matrix_along() {
     assert_eq!(said("to-xyz rgb.exr --quiet -o own.exr"), "");
     shop.run("to-xyz rgb.exr --matrix m.yaml -o file.exr", &[]);
     assert!(said("to-xyz rgb.exr --matrix m.yaml -v -o told.exr").contains("to-xyz: m.yaml: XYZ are relative, Y = 1"));
+    // It is for shares of the range, whatever that is.
+    assert!(!String::from_utf8(shop.bytes("m.yaml")).unwrap().contains("range_adu"));
     let [own, file] = ["own.exr", "file.exr"].map(|name| shop.frame(name));
     assert_eq!(own.samples, file.samples);
     assert_eq!(own.header.metadata.unit, "relative");

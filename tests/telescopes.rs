@@ -51,6 +51,26 @@ fn times_are_compared_where_no_aperture_is_told() {
     }
 }
 
+/// What a cooler and a clock are off by hardly changes a dark signal: 0.2 K is 2 % of it.
+#[test]
+fn conditions_that_are_nearly_the_same_are_not_told() {
+    let shop = Workshop::new();
+    let camera = [("INSTRUME", "'A'"), ("EXPTIME", "2.0"), ("CCD-TEMP", "-10.0")];
+    write(&shop, "light.fits", [900, 1], &[&camera[..], &[("IMAGETYP", "'Light Frame'")]].concat());
+    let cases = [
+        ("2.0", "-9.9", false),
+        ("2.0015", "-9.8", false),
+        ("2.0", "-10.2", false),
+        ("2.003", "-10.0", true),
+        ("2.0", "-9.7", true),
+    ];
+    for (time, temperature, is_told) in cases {
+        write(&shop, "dark.fits", [100, 2], &[DARK, camera[0], ("EXPTIME", time), ("CCD-TEMP", temperature)]);
+        let told = shop.said("correct-frame light.fits --dark dark.fits -o out.exr", 0);
+        assert_eq!(told.contains("their dark signals differ"), is_told, "{time} s, {temperature}: {told}");
+    }
+}
+
 #[test]
 fn darks_are_scaled_by_times_alone() {
     let shop = night(&[DARK, ("EXPTIME", "8.0")]);

@@ -389,6 +389,85 @@ fn a_chart_that_is_turned_is_told() {
     assert!(shop.said(table, BAD_USAGE).ends_with("which alone is described so; leave out --lens-transmittance\n"));
 }
 
+/// A matrix keeps what it was fitted to: sensitivity, for absolute XYZ, and the range between black and white.
+#[test]
+fn codes_unlike_those_of_the_chart_are_told() {
+    let shop = Workshop::new();
+    chart(&shop);
+    for (name, iso, white) in [("same", 100, 4100), ("fast", 800, 4100), ("wide", 100, 16_100)] {
+        let text = format!(
+            "schema: cyanometer/1\nquantity: adu\ncfa: rggb\nblack_level_adu: 100\nwhite_level_adu: {white}\niso_speed: \
+             {iso}\nexposure: {{exposure_s: 0.01, f_number: 8, lens_transmittance: 1}}\n"
+        );
+        fs::write(shop.path(&format!("{name}.yaml")), text).unwrap();
+        shop.run(&format!("demosaic chart.exr --metadata {name}.yaml -o {name}.exr"), &[]);
+    }
+    let fit = "fit-matrix --chart chart.exr --metadata same.yaml --corners 20,20,220,20,220,140,20,140";
+    shop.run(&format!("{fit} -o relative.yaml"), &[]);
+    shop.run(&format!("{fit} --luminance 100 -o absolute.yaml"), &[]);
+    let told = |frame: &str, matrix: &str| {
+        let said = shop.said(&format!("to-xyz {frame}.exr --matrix {matrix}.yaml -o {frame}-{matrix}.exr"), 0);
+        let begin = format!("to-xyz: warning: {frame}.exr: {matrix}.yaml was fitted ");
+        said.strip_prefix(&begin).map_or_else(|| said.clone(), str::to_owned)
+    };
+    assert_eq!([told("same", "relative"), told("same", "absolute"), told("fast", "relative")], [""; 3]);
+    assert_eq!(
+        told("fast", "absolute"),
+        "at ISO 100, and the frame has ISO 800: XYZ come out 8.0000 times what they are, as far as codes go with it\n"
+    );
+    let ranges = "to codes with 4000 ADU from black to white, and the codes have 16000";
+    assert_eq!(
+        told("wide", "relative"),
+        format!(
+            "{ranges}, by which they are divided: XYZ come out 0.2500 times what they are, unless codes go with that range\n"
+        )
+    );
+    assert_eq!(
+        told("wide", "absolute"),
+        format!("{ranges}: XYZ come out 4.0000 times what they are if codes go with that range\n")
+    );
+    // The codes are the same.
+    let [same, wide] = ["same-relative.exr", "wide-relative.exr"].map(|name| shop.read(name).0);
+    assert!(same.iter().zip(&wide).all(|(same, wide)| (0.25 * same - wide).abs() <= 1e-6 * same.abs()));
+    // Files that say nothing of it, such as those of older versions, are read.
+    for (frame, matrix) in [("fast", "absolute"), ("wide", "relative"), ("wide", "absolute")] {
+        let text = String::from_utf8(shop.bytes(&format!("{matrix}.yaml"))).unwrap();
+        let is_kept = |line: &&str| !line.starts_with("iso_speed:") && !line.starts_with("range_adu:");
+        let less: Vec<&str> = text.lines().filter(is_kept).collect();
+        assert_eq!(text.lines().count() - less.len(), if matrix == "absolute" { 2 } else { 1 });
+        fs::write(shop.path("old.yaml"), less.join("\n") + "\n").unwrap();
+        assert_eq!(told(frame, "old"), "");
+    }
+}
+
+/// Means of patches in ADU have the range that they are made shares of, shares have none; and a camera that is predicted has that of its
+/// converter.
+#[test]
+fn ranges_of_means_of_patches_are_kept() {
+    let shop = Workshop::new();
+    let white = [0.9642, 1.0, 0.8249];
+    let colors = load_reference("colorchecker").unwrap().colors_in(white).unwrap();
+    for (name, black, range) in [("adu", 100.0, 4000.0), ("shares", 0.0, 1.0)] {
+        let row = |[x, y, z]: &[f64; 3]| {
+            let adu = [x + 0.1 * y, *y, z + 0.1 * y].map(|share| (black + range * 0.7 * share).to_string());
+            adu.join(",") + "\n"
+        };
+        let rows: String = colors.iter().map(row).collect();
+        fs::write(shop.path(&format!("{name}.csv")), format!("R,G,B\n{rows}")).unwrap();
+    }
+    shop.run("fit-matrix --patches adu.csv --levels 100,4100 -o adu.yaml", &[]);
+    shop.run("fit-matrix --patches shares.csv -o shares.yaml", &[]);
+    let kept = |name: &str| String::from_utf8(shop.bytes(name)).unwrap().contains("\nrange_adu: 4000.0\n");
+    assert_eq!([kept("adu.yaml"), kept("shares.yaml")], [true, false]);
+    let predict = "predict-noise --electrons 900,900,900 --output-format json --matrix";
+    assert_eq!(shop.said(&format!("{predict} shares.yaml"), 0), "");
+    let said = shop.said(&format!("{predict} adu.yaml"), 0);
+    assert!(
+        said.contains("adu.yaml was fitted to codes with 4000 ADU from black to white, and the codes have 2342"),
+        "{said}"
+    );
+}
+
 #[test]
 fn a_matrix_of_another_camera_is_told() {
     let shop = Workshop::with_frames();

@@ -32,7 +32,7 @@ pub fn options_of(program: &str) -> Option<BTreeSet<String>> {
 
 /// The long options that a text names.
 pub fn named(text: &str) -> Vec<String> {
-    let words = text.split(|c: char| c.is_whitespace() || "`,;()|='\"".contains(c));
+    let words = text.split(|c: char| c.is_whitespace() || "`,;()[]|='\"".contains(c));
     let long = words.filter_map(|word| word.strip_prefix("--"));
     long.map(|name| name.trim_end_matches(['.', ':', '?']).to_owned()).filter(|name| !name.is_empty()).collect()
 }
@@ -48,6 +48,12 @@ pub fn wrong_option(program: &str, message: &str) -> Option<(String, String)> {
         Some((other.to_owned(), name))
     });
     let outside = message.split('`').step_by(2).collect::<Vec<_>>().join(" ");
+    // `it is a matrix file, for --matrix`: of whatever program.
+    let outside = outside.split(", for --").enumerate().map(|(index, part)| match index {
+        0 => part,
+        _ => part.split_once([';', ',', ' ']).map_or("", |(_, rest)| rest),
+    });
+    let outside = outside.collect::<Vec<_>>().join(" ");
     let own = || named(&outside).into_iter().find(|name| !is_there(program, name));
     of_quoted.or_else(|| own().map(|name| (program.to_owned(), name)))
 }

@@ -153,7 +153,15 @@ fn meant(argument: &str, command: &Command, words: &[String]) -> Option<String> 
         let guess = GUESSES.iter().find(|(guess, option)| *guess == typed && has(&option[2..]));
         guess.map(|(_, option)| (*option).to_owned())
     };
-    by_value.or_else(by_name)
+    // `--unit` for `--radiance-unit`.
+    let by_part = || {
+        let one = typed.strip_suffix('s').unwrap_or(typed);
+        let is_part =
+            |long: &&str| long.split('-').count() > 1 && long.split('-').any(|part| part == typed || part == one);
+        let mut found = command.get_arguments().filter_map(clap::Arg::get_long).filter(is_part);
+        found.next().filter(|_| found.next().is_none()).map(|long| format!("--{long}"))
+    };
+    by_value.or_else(by_name).or_else(by_part)
 }
 
 /// Whether an argument, as clap shows it, is needed whatever options are given: of options those that are declared so.

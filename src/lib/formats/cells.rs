@@ -3,6 +3,7 @@
 use super::delimited::{self, Separator, decimal, number};
 use super::foreign::{csv_complaint, line_of};
 use super::keys;
+use super::thousands::Thousands;
 use crate::error::{Error, Result};
 use csv::StringRecord;
 use flate2::read::GzDecoder;
@@ -48,7 +49,7 @@ impl Cells {
         text: &str,
         reader: &mut csv::Reader<&[u8]>,
         first: Option<&StringRecord>,
-        by_rows: bool,
+        (by_rows, separator): (bool, char),
     ) -> Result<Self> {
         let refuse = |problem: String| Error::format(name, problem);
         let (mut numbers, mut labels, mut rows, mut width) = (Vec::new(), Vec::new(), 0, 0);
@@ -56,6 +57,7 @@ impl Cells {
         let mut at_hand = first.is_some();
         let mut spoiled = BTreeMap::new();
         let [mut has_points, mut has_commas] = [false; 2];
+        let mut thousands = Thousands::default();
         // One row at a time: as text a table takes many times the memory of its numbers.
         while std::mem::take(&mut at_hand)
             || reader.read_record(&mut record).map_err(|e| csv_complaint(name, text, &e))?
@@ -72,6 +74,9 @@ impl Cells {
                 has_points |= cell.contains('.') && number(cell).is_some();
                 has_commas |= decimal(cell).is_some();
                 let value = numeric(cell);
+                if !(by_rows && column == 0) {
+                    thousands.take(if by_rows { 1 } else { column }, cell, line);
+                }
                 numbers.push(match value.filter(|value| by_rows && column == 0 || !is_fill(*value)) {
                     Some(value) => value,
                     // The label of a row need not be a number.
@@ -92,6 +97,7 @@ impl Cells {
         if has_points && has_commas {
             return Err(refuse("its numbers have decimal points and decimal commas; write all with a point".into()));
         }
+        thousands.check(name, separator)?;
         let numbers =
             Array2::from_shape_vec((rows, width), numbers).map_err(|_| refuse("its rows differ in length".into()))?;
         let curves = if by_rows { rows } else { width.saturating_sub(1) };

@@ -109,7 +109,8 @@ impl SpectralTable {
         // Names, or times, before wavelengths are no numbers.
         let misplaced =
             |error| if above_columns { check_first_column(name, &first).err().unwrap_or(error) } else { error };
-        let cells = Cells::read(name, text.rows(), &mut reader, at_hand.as_ref(), by_rows).map_err(misplaced)?;
+        let layout = (by_rows, text.separator());
+        let cells = Cells::read(name, text.rows(), &mut reader, at_hand.as_ref(), layout).map_err(misplaced)?;
         let (first, units, cells) = match above_columns && is_behind_index(&first, &cells.numbers) {
             true => (without_first(&first), units.as_ref().map(without_first), cells.without_first(name)?),
             false => (first, units, cells),
@@ -197,6 +198,13 @@ impl SpectralTable {
     pub fn column_index(&self, column: Option<&str>) -> Result<usize> {
         let Some(column) = column else { return Ok(0) };
         let is_it = |name: &&str| name.eq_ignore_ascii_case(column);
+        let alike = self.columns.iter().filter(|name| name.as_str() == column || without_unit(name) == column).count();
+        if alike > 1 {
+            let problem = format!(
+                "{alike} columns are called `{column}`; give each a name of its own, with its unit behind it in brackets"
+            );
+            return Err(Error::format(&self.name, problem));
+        }
         let exact = place_of(column, self.columns.iter().map(String::as_str));
         // Of columns that a comment names, too.
         let counted = || {

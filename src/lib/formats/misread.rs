@@ -103,6 +103,7 @@ pub(super) fn explained(name: &str, bytes: &[u8]) -> Option<Error> {
     uvspec(name, &decoded)
         .or_else(|| tape7(name, &decoded))
         .or_else(|| marks_of_thousands(name, &decoded))
+        .or_else(|| above_named_columns(name, &decoded))
         .or_else(|| preamble(name, &decoded))
 }
 
@@ -153,6 +154,32 @@ fn tape7(name: &str, text: &str) -> Option<Error> {
          headed as `freq (cm-1),radiance (W cm-2 sr-1 / cm-1)`"
     );
     Some(Error::format(name, problem))
+}
+
+/// A complaint of lines above a heading whose first column is that of wavelengths, where numbers follow that.
+fn above_named_columns(name: &str, text: &str) -> Option<Error> {
+    /// So many lines are looked at, where none is longer than people read.
+    const LOOKED_AT: usize = 200;
+    const LONGEST: usize = 1 << 16;
+    const MARKS: [char; 3] = [',', ';', '\t'];
+    let mut lines = text.lines().enumerate().take(LOOKED_AT).filter(|(_, line)| {
+        let line = line.trim_start();
+        !line.is_empty() && !line.starts_with(['#', '%', '!'])
+    });
+    let (first, _) = lines.clone().next()?;
+    let begin = |line: &str| line.split(MARKS).next().unwrap_or_default().trim_matches(['"', ' ']).to_owned();
+    let is_heading = |(_, line): &(usize, &str)| line.contains(MARKS) && is_of_wavelengths(&begin(line));
+    let (heading, columns) = lines.by_ref().take_while(|(_, line)| line.len() < LONGEST).find(is_heading)?;
+    let (_, row) = lines.next()?;
+    let are_alike = columns.split(MARKS).count() == row.split(MARKS).count() && numeric(&begin(row)).is_some();
+    let last = text.lines().take(heading).enumerate().filter(|(_, line)| !line.trim().is_empty()).last()?.0;
+    let said = match last == first {
+        true => format!("line {} stands", first + 1),
+        false => format!("lines {} to {} stand", first + 1, last + 1),
+    };
+    let problem =
+        format!("{said} above the heading of its columns, line {}; put a # before what is no table", heading + 1);
+    (heading > first && are_alike).then(|| Error::format(name, problem))
 }
 
 /// A complaint of lines that stand above the heading of a table, where there are any but one of units; or of one above numbers that is
@@ -300,6 +327,14 @@ mod tests {
             (
                 "TF 4    2    2\n  1 2 0 3\n   FREQ   TOT_TRANS  TOTAL_RAD\n 12000.0 0.8 1e-7\n 12010.0 0.8 1e-7\n -9999.\n",
                 "t: it looks like a tape7 of MODTRAN, with cards above its heading, line 3; keep the columns FREQ and TOTAL_RAD",
+            ),
+            (
+                "Sky radiance zenith\nwavelength (nm),radiance (W m-2 sr-1 nm-1)\n350,.05\n850,.002\n",
+                "t: line 1 stands above the heading of its columns, line 2; put a # before what is no table",
+            ),
+            (
+                "Site,Athens,,\nDate,2024-03-01,,\nwavelength,a,b,c\n350,1,2,3\n850,1,2,3\n",
+                "t: lines 1 to 2 stand above the heading of its columns, line 3; put a # before what is no table",
             ),
             ("Sky at noon\n400,1\n410,2\n", "t: line 1 has 1 cell above 2 columns: put a # before it if it is a title"),
             (

@@ -52,6 +52,7 @@ pub mod standard;
 pub mod stored_rows;
 mod storing;
 pub mod table;
+mod thousands;
 pub mod tiff;
 mod uncertainties;
 pub mod unread;

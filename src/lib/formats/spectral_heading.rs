@@ -36,11 +36,11 @@ pub(super) struct Wavelengths {
 /// [`Error::Format`] naming a cell that is none where most others are, or a heading without a name before them.
 pub(super) fn wavelengths(name: &str, line: u64, heading: &StringRecord, below: &str) -> Result<Option<Wavelengths>> {
     let numbers: Option<Vec<f64>> = heading.iter().skip(1).map(numeric).collect();
-    if let Some(values) = numbers.filter(|values| values.len() > 1) {
+    if let Some(values) = numbers.filter(|values| values.len() > 1 && !are_names(&heading[0], values, below)) {
         return Ok(Some(Wavelengths { values, unit: None }));
     }
     // Under a heading of wavelengths these stand below it.
-    let labels: Vec<Option<Label>> = heading.iter().map(Label::of).collect();
+    let labels: Vec<Option<Label>> = heading.iter().map(|cell| Label::of(cell).or_else(|| Label::bare(cell))).collect();
     let known = labels.iter().skip(1).flatten();
     let Some(usual) = known.clone().next().filter(|_| !(names_wavelengths(&heading[0]) && numeric(below).is_some()))
     else {
@@ -73,6 +73,25 @@ pub(super) fn wavelengths(name: &str, line: u64, heading: &StringRecord, below: 
     Ok(Some(Wavelengths { values: like, unit: usual.unit }))
 }
 
+/// Whether numbers behind a heading of wavelengths are names of columns, such as angles: these wavelengths stand below it, and they are not
+/// many that go one way through the light.
+fn are_names(corner: &str, values: &[f64], below: &str) -> bool {
+    /// Nobody names so many columns by wavelengths.
+    const MANY: usize = 8;
+    /// Of no light that a camera sees.
+    const LEAST_NM: f64 = 100.0;
+    const MOST_NM: f64 = 5000.0;
+    if !names_wavelengths(corner) {
+        return false;
+    }
+    let unit = WavelengthUnit::of_heading(corner).ok().flatten().unwrap_or(WavelengthUnit::Nanometer);
+    let is_light = |value: f64| (LEAST_NM..=MOST_NM).contains(&unit.nm(value));
+    let goes_one_way =
+        values.windows(2).all(|pair| pair[0] < pair[1]) || values.windows(2).all(|pair| pair[0] > pair[1]);
+    let are_wavelengths = values.len() >= MANY && goes_one_way && values.iter().all(|value| is_light(*value));
+    numeric(below).is_some_and(is_light) && !are_wavelengths
+}
+
 /// A wavelength with words about it.
 #[derive(Debug)]
 struct Label {
@@ -100,6 +119,13 @@ impl Label {
         let nm = unit.unwrap_or(WavelengthUnit::Nanometer).nm(value);
         let is_named = unit.is_some() || WORDS.contains(&before.as_str());
         (is_named && (SHORTEST_NM..=LONGEST_NM).contains(&nm)).then_some(Self { before, value, unit })
+    }
+
+    /// That of a cell which holds a wavelength and nothing else, beside others that do.
+    fn bare(cell: &str) -> Option<Self> {
+        const SEEN_NM: std::ops::RangeInclusive<f64> = 200.0..=5000.0;
+        let value = numeric(cell).filter(|nm| SEEN_NM.contains(nm))?;
+        Some(Self { before: String::new(), value, unit: None })
     }
 
     /// Whether another is written in the same way.
@@ -232,6 +258,12 @@ mod tests {
             assert_eq!(table.wavelength_nm, [400.0, 500.0, 600.0], "{text}");
             assert_eq!(table.values.iter().copied().collect::<Vec<_>>(), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "{text}");
         }
+        // Angles and times above columns.
+        for heading in ["0,30,60", "10,20,30", "401,402,403", "2019,2020,2021"] {
+            let text = format!("wavelength (nm),{heading}\n350,1,2,3\n600,4,5,6\n850,7,8,9\n");
+            let table = SpectralTable::parse("t", text.as_bytes()).unwrap();
+            assert_eq!((table.columns.join(",").as_str(), table.wavelength_nm.len()), (heading, 3));
+        }
         // Columns named by a wavelength of something else, beside one of wavelengths.
         let excited = SpectralTable::parse("t", b"wavelength_nm,ex350nm,ex360nm\n400,1,2\n500,3,4\n").unwrap();
         assert_eq!((excited.columns[0].as_str(), excited.wavelength_nm.len()), ("ex350nm", 2));
@@ -247,6 +279,10 @@ mod tests {
             (
                 "# x\nid,site,400nm,500nm,600nm\n1,a,1,2,3\n",
                 "line 2, column 2: `site` is no wavelength as the others are, such as `400nm`",
+            ),
+            (
+                "name,sza,400,500,600,700\nz,50.7,1,2,3,4\ny,40,1,2,3,4\n",
+                "line 1, column 2: `sza` is no wavelength as the others are, such as `400`",
             ),
             ("400nm,500nm,600nm\n1,2,3\n4,5,6\n", "its rows are spectra without names"),
             ("id,site,400,500,600\n1,a,1,2,3\n", "line 1, column 2: `site` is no wavelength, as the others are"),

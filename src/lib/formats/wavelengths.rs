@@ -82,7 +82,10 @@ fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
         return Err(format!("{range}, which no light has; its first column must hold wavelengths"));
     }
     if *last < SHORTEST_NM {
-        let are_seen = |unit: WavelengthUnit| wavelength_nm.iter().any(|value| SEEN_NM.contains(&unit.nm(*value)));
+        let are_seen = |unit: WavelengthUnit| {
+            let [one, other] = [*first, *last].map(|value| unit.nm(value));
+            one.min(other) <= *SEEN_NM.end() && one.max(other) >= *SEEN_NM.start()
+        };
         let like = match [WavelengthUnit::Micrometer, WavelengthUnit::ElectronVolt].map(are_seen) {
             [false, true] => "energies of photons in eV; name their unit in the heading, such as `energy_eV`".into(),
             [true, true] => format!("micrometers, or energies of photons in eV; {name} `wavelength_um` or `energy_eV`"),

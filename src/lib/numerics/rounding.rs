@@ -81,6 +81,17 @@ fn moments_of_rounding(x: f64, sigma: f64) -> [f64; 4] {
     found
 }
 
+/// Moments 1 to 4, about a whole number from which the mean is off by `x`, of a rounded normal variable that no end is near; of a standard
+/// deviation of no less than [`FEW_TERMS`].
+fn free_moments(x: f64, sigma: f64) -> [f64; 4] {
+    let smooth = about(x, sigma * sigma + 1.0 / 12.0, -1.0 / 120.0);
+    if sigma >= SMOOTH {
+        return smooth;
+    }
+    let waves = moments_of_rounding(x, sigma);
+    [0, 1, 2, 3].map(|j| smooth[j] + waves[j])
+}
+
 /// Powers 1 to 4.
 fn powers(x: f64) -> [f64; 4] {
     let square = x * x;
@@ -120,18 +131,20 @@ impl Rounding {
         }
         let reach = REACH * sigma;
         let is_free = mean - reach > self.lowest && mean + reach < self.highest;
-        if is_free && sigma >= SMOOTH {
-            return about(mean - center, sigma * sigma + 1.0 / 12.0, -1.0 / 120.0);
-        }
         if is_free && sigma >= FEW_TERMS {
-            let smooth = about(mean - center, sigma * sigma + 1.0 / 12.0, -1.0 / 120.0);
-            let waves = moments_of_rounding(mean - center, sigma);
-            return [0, 1, 2, 3].map(|j| smooth[j] + waves[j]);
+            return free_moments(mean - center, sigma);
         }
         if mean + reach < self.lowest - 0.5 || mean - reach > self.highest + 0.5 {
             return powers(self.code(mean) - center);
         }
-        if sigma < WIDE { self.sum(mean, sigma, center) } else { self.integral(mean, sigma, center) }
+        if sigma >= WIDE {
+            return self.integral(mean, sigma, center);
+        }
+        if sigma >= FEW_TERMS && self.is_mostly_within(mean, reach) {
+            self.less_beyond(mean, sigma, center)
+        } else {
+            self.sum(mean, sigma, center)
+        }
     }
 
     /// The first of [`Self::moments`], in less time.
@@ -148,6 +161,11 @@ impl Rounding {
         }
         if sigma >= WIDE {
             return self.mean_of_integral(mean, sigma, center);
+        }
+        if sigma >= FEW_TERMS && self.is_mostly_within(mean, reach) {
+            let mut found = mean - center + of_rounding(mean, sigma);
+            self.each_beyond(mean, sigma, |_, share| found += share);
+            return found;
         }
         let base = self.code(mean);
         let mut found = base - center;
@@ -167,6 +185,38 @@ impl Rounding {
     /// The code of a number.
     pub fn code(&self, number: f64) -> f64 {
         number.round().clamp(self.lowest, self.highest)
+    }
+
+    /// Whether more codes within reach of a mean lie between the ends than beyond them.
+    fn is_mostly_within(&self, mean: f64, reach: f64) -> bool {
+        self.highest.min(mean + reach) - self.lowest.max(mean - reach) > reach
+    }
+
+    /// Goes through the edges k + ½ beyond the ends: k, and what clipping adds to the share of what lies beyond the edge.
+    fn each_beyond(&self, mean: f64, sigma: f64, mut of: impl FnMut(f64, f64)) {
+        let reach = REACH * sigma;
+        let mut code = self.highest;
+        while code + 0.5 < mean + reach {
+            of(code, -cumulative((mean - code - 0.5) / sigma));
+            code += 1.0;
+        }
+        code = self.lowest - 1.0;
+        while code + 0.5 > mean - reach {
+            of(code, cumulative((code + 0.5 - mean) / sigma));
+            code -= 1.0;
+        }
+    }
+
+    /// The moments of codes without ends, less what lies beyond these: fewer terms than a sum over the codes between them.
+    fn less_beyond(&self, mean: f64, sigma: f64, center: f64) -> [f64; 4] {
+        let mut moments = free_moments(mean - center, sigma);
+        self.each_beyond(mean, sigma, |code, share| {
+            let (below, above) = (powers(code - center), powers(code + 1.0 - center));
+            for (moment, (below, above)) in moments.iter_mut().zip(below.into_iter().zip(above)) {
+                *moment += share * (above - below);
+            }
+        });
+        moments
     }
 
     /// Σ over the edges k + ½ of codes, of the step of the power there and the probability to be beyond.

@@ -249,11 +249,17 @@ fn decade_of(value: f64) -> i32 {
 /// A number in digits down to the power of ten `unit`, beside others up to that of `magnitude`.
 fn written(value: f64, magnitude: i32, unit: i32) -> String {
     let digits = |below: i32| usize::try_from(below).unwrap_or(0);
-    if value == 0.0 {
+    if value.abs() < 0.5 * 10_f64.powi(unit) {
         "0".into()
     } else if (-3..6).contains(&magnitude) {
         minus(&format!("{value:.*}", digits(-unit)))
     } else {
+        let rounds_up = |mantissa: f64| {
+            let places = 10_f64.powi(magnitude - unit);
+            (mantissa.abs() * places).round() >= 10.0 * places
+        };
+        // Of 9.99 too few digits may make 10.
+        let magnitude = magnitude + i32::from(rounds_up(value / 10_f64.powi(magnitude)));
         let mantissa = value / 10_f64.powi(magnitude);
         minus(&format!("{mantissa:.*}·{}", digits(magnitude - unit), power_of_ten(magnitude)))
     }

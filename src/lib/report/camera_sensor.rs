@@ -24,6 +24,33 @@ impl Told {
     fn tell(&mut self, key: &'static str, kind: Origin, why: impl Into<String>) {
         self.0.insert(format!("readout.{key}"), Provenance { kind, note: Some(why.into()) });
     }
+
+    /// A number as it is measured; 0 where it is not told from none.
+    fn taken(&mut self, camera: &MeasuredCamera, key: &'static str, from: &'static str) -> f64 {
+        match pooled(&camera.classes, from) {
+            Some(found) if found.value > 0.0 && found.low > 0.0 => {
+                self.tell(key, Origin::Measured, shown(found));
+                found.value
+            }
+            Some(found) => {
+                self.tell(key, Origin::Assumed, format!("none is told from none: {}", shown(found)));
+                0.0
+            }
+            None => {
+                self.tell(key, Origin::Assumed, format!("none; {}", reason(&camera.classes, from)));
+                0.0
+            }
+        }
+    }
+
+    /// A number of photosites that do not stand out.
+    fn derived(&mut self, key: &'static str, of_most: f64) -> f64 {
+        let why = "of photosites that do not stand out, behind the high-pass filter";
+        let none = "none is told from none, of photosites that do not stand out";
+        let (kind, why) = if of_most > 0.0 { (Origin::Derived, why) } else { (Origin::Assumed, none) };
+        self.tell(key, kind, why);
+        of_most
+    }
 }
 
 /// The read-out of a measured camera as a sensor, each number with its origin: measured, derived from what was measured, or assumed.
@@ -38,10 +65,11 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     if metadata.quantity == QuantityKind::Electrons {
         return Err(lacking("the frames are of electrons, before any converter"));
     }
-    let top = metadata
+    let said = metadata
         .white_level_adu
         .map(|white| white.largest())
         .ok_or_else(|| lacking("the largest code is not known").give(&["white"]))?;
+    let top = camera.largest.unwrap_or(said);
     let mut told = Told::default();
     let pooled = |key: &str| pooled(&camera.classes, key);
     let needed = |key: &str| pooled(key).ok_or_else(|| lacking(&reason(&camera.classes, key)));
@@ -71,33 +99,18 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
             reached.max(range)
         }
     };
-    let mut taken = |key: &'static str, from: &'static str| match pooled(from) {
-        Some(found) if found.value > 0.0 && found.low > 0.0 => {
-            told.tell(key, Origin::Measured, shown(found));
-            found.value
-        }
-        Some(found) => {
-            told.tell(key, Origin::Assumed, format!("none is told from none: {}", shown(found)));
-            0.0
-        }
-        None => {
-            told.tell(key, Origin::Assumed, format!("none; {}", reason(&camera.classes, from)));
-            0.0
-        }
+    let row_noise_e = told.taken(camera, "row_noise_e", "row_noise_e");
+    let column_noise_e = told.taken(camera, "column_noise_e", "column_noise_e");
+    let prnu = match of_most(camera, 0, "prnu_pixel") {
+        Some(of_most) => told.derived("prnu", of_most),
+        None => told.taken(camera, "prnu", "prnu_pixel"),
     };
-    let row_noise_e = taken("row_noise_e", "row_noise_e");
-    let column_noise_e = taken("column_noise_e", "column_noise_e");
-    let prnu = taken("prnu", "prnu_pixel");
-    let dark_current = taken("dark_current_e_per_s", "dark_current_e_per_s");
-    let all_dcnu = if dark_current > 0.0 { taken("dcnu", "dcnu") } else { 0.0 };
-    let dsnu_e = if all_dcnu > 0.0 { taken("dsnu_e", "dsnu_offset_e") } else { taken("dsnu_e", "dsnu_pixel_e") };
-    let dark = [dark_current, all_dcnu, dsnu_e * gain.value];
-    let Dark { dark_current_e_per_s, dcnu, hot_pixel_share, hot_pixel_dark_current_e_per_s } =
-        dark_of(camera, gain.value, dark, &mut told);
+    let Dark { dark_current_e_per_s, dcnu, dsnu_e, hot_pixel_share, hot_pixel_dark_current_e_per_s } =
+        dark_of(camera, gain.value, &mut told);
     let lines = [("prnu_column", 0, 0), ("prnu_row", 0, 1), ("dsnu_column_e", 1, 0), ("dsnu_row_e", 1, 1)];
     let [prnu_column, prnu_row, dsnu_column_e, dsnu_row_e] = lines.map(|(key, stack, axis)| {
         let found = lines_of(camera, stack, axis) / if stack == 1 { gain.value } else { 1.0 };
-        let why = "as the high-pass filter shows it, so that what varies smoothly does not count";
+        let why = "as the high-pass filter shows it, so that what varies smoothly does not count, nor photosites that stand out";
         told.tell(
             key,
             if found > 0.0 { Origin::Derived } else { Origin::Assumed },
@@ -176,47 +189,100 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     Ok(sensor)
 }
 
-/// The dark current of a sensor file, with that of hot photosites apart.
+/// What single photosites differ by under light, a share, or in the dark, in samples, without those that stand out: where there are hot ones, or
+/// too few others tell it from none. None where the number of all counts, or nothing tells one.
+fn of_most(camera: &MeasuredCamera, stack: usize, from: &str) -> Option<f64> {
+    let found = pooled(&camera.classes, from)?;
+    let are_hot = camera.classes.iter().any(|class| class.hot.is_some());
+    let views = camera.patterns.iter().map(|views| views[stack].as_ref().map(|view| view.rest));
+    let views = views.collect::<Option<Vec<[f64; 2]>>>().filter(|_| are_hot || found.low <= 0.0)?;
+    let count = views.len().max(1) as f64;
+    let variance = views.iter().map(|[variance, _]| variance).sum::<f64>() / count;
+    let scatter = views.iter().map(|[_, scatter]| scatter * scatter).sum::<f64>().sqrt() / count;
+    (variance > 2.0 * scatter).then(|| variance.sqrt())
+}
+
+/// The dark current of a sensor file and the pattern of the dark, with what is of hot photosites apart.
 struct Dark {
     dark_current_e_per_s: f64,
     dcnu: f64,
+    dsnu_e: f64,
     hot_pixel_share: f64,
     hot_pixel_dark_current_e_per_s: f64,
 }
 
-/// Hot photosites apart from all others, of a mean dark current in e⁻/s and its non-uniformity as they are measured of all, and a pattern
-/// that no time adds, in codes: a normal law of all would have negative dark currents where hot ones are in it.
-fn dark_of(camera: &MeasuredCamera, gain: f64, [current, all_dcnu, offset]: [f64; 3], told: &mut Told) -> Dark {
+/// Dark current, its non-uniformity and the pattern that no time adds; where there are hot photosites those of all others, with the hot
+/// ones apart: a normal law of all would have negative dark currents.
+fn dark_of(camera: &MeasuredCamera, gain: f64, told: &mut Told) -> Dark {
     let classes = camera.classes.len() as f64;
+    let current = told.taken(camera, "dark_current_e_per_s", "dark_current_e_per_s");
     let hot: Vec<HotTail> = camera.classes.iter().filter_map(|class| class.hot).collect();
     let share = hot.iter().map(|tail| tail.share).sum::<f64>() / classes;
     let mean = hot.iter().map(|tail| tail.share * tail.excess_per_s).sum::<f64>() / classes / gain;
     let count: usize = hot.iter().map(|tail| tail.count).sum();
-    let are_few = count == 0 || count < LEAST_HOT && all_dcnu <= MOST_DCNU;
-    if all_dcnu <= 0.0 || are_few {
-        if all_dcnu > MOST_DCNU {
-            let why = format!("more than a normal law may have; {all_dcnu:.3} was measured");
-            told.tell("dcnu", Origin::Assumed, why);
-        }
-        let dcnu = all_dcnu.min(MOST_DCNU);
-        return Dark { dark_current_e_per_s: current, dcnu, hot_pixel_share: 0.0, hot_pixel_dark_current_e_per_s: 0.0 };
-    }
+    let of_all = pooled(&camera.classes, "dcnu").filter(|found| current > 0.0 && found.value > 0.0);
+    // What few make of all may be told still.
+    let is_of_all = |found: &Interval| count < LEAST_HOT && found.low > 0.0 && found.value <= MOST_DCNU;
+    let Some(of_all) = of_all.filter(|found| count > 0 && !is_of_all(found)) else {
+        return dark_of_all(camera, gain, current, told);
+    };
+    let dsnu_e = match offset_of_most(&hot) {
+        Some(offset) => told.derived("dsnu_e", offset / gain),
+        None => told.taken(camera, "dsnu_e", "dsnu_offset_e"),
+    };
     // What chance has above all of the dark current is no more than that.
     let (of_one, mean) = (mean / share, mean.min(current));
     let others = current - mean;
     // Per second, as a share of the current of others.
-    let spread = |tail: &HotTail| (tail.others - offset * offset).max(0.0) / (tail.exposure_s * gain * others).powi(2);
-    let square = if others > 0.0 { hot.iter().map(spread).sum::<f64>() / hot.len() as f64 } else { 0.0 };
-    let dcnu = square.sqrt().min(MOST_DCNU);
+    let offset = dsnu_e * gain;
+    let by_others = |tail: &HotTail| (tail.others - offset * offset).max(0.0) / tail.exposure_s.powi(2);
+    let spread = |tail: &HotTail| tail.parted.map_or_else(|| by_others(tail), |[_, per_s2]| per_s2);
+    let square = hot.iter().map(spread).sum::<f64>() / hot.len() as f64;
+    let dcnu = if others > 0.0 { (square.sqrt() / (gain * others)).min(MOST_DCNU) } else { 0.0 };
     let by =
         format!("{count} photosites that stand out of the darks of {} s, by an exponential law", hot[0].exposure_s);
     told.tell("hot_pixel_share", Origin::Derived, by.clone());
     told.tell("hot_pixel_dark_current_e_per_s", Origin::Derived, by);
-    let of_all = format!("without hot photosites, of which it was {}", crate::text::in_digits(current, 4));
-    told.tell("dark_current_e_per_s", Origin::Derived, of_all);
-    let of_all = format!("that of most photosites; with hot ones it was {}", crate::text::in_digits(all_dcnu, 4));
-    told.tell("dcnu", Origin::Derived, of_all);
-    Dark { dark_current_e_per_s: others, dcnu, hot_pixel_share: mean / of_one, hot_pixel_dark_current_e_per_s: of_one }
+    let without = format!("without hot photosites, of which it was {}", crate::text::in_digits(current, 4));
+    told.tell("dark_current_e_per_s", Origin::Derived, without);
+    let all = crate::text::in_digits(of_all.value, 4);
+    told.tell("dcnu", Origin::Derived, format!("that of most photosites; with hot ones it was {all}"));
+    Dark {
+        dark_current_e_per_s: others,
+        dcnu,
+        dsnu_e,
+        hot_pixel_share: mean / of_one,
+        hot_pixel_dark_current_e_per_s: of_one,
+    }
+}
+
+/// The same of such a dark current where no hot photosites are parted from all.
+fn dark_of_all(camera: &MeasuredCamera, gain: f64, current: f64, told: &mut Told) -> Dark {
+    let all_dcnu = if current > 0.0 { told.taken(camera, "dcnu", "dcnu") } else { 0.0 };
+    if all_dcnu > MOST_DCNU {
+        let why = format!("more than a normal law may have; {all_dcnu:.3} was measured");
+        told.tell("dcnu", Origin::Assumed, why);
+    }
+    let hot: Vec<HotTail> = camera.classes.iter().filter_map(|class| class.hot).collect();
+    let is_told = |key: &str| pooled(&camera.classes, key).is_none_or(|found| found.low > 0.0);
+    let (from, of_others) = if all_dcnu > 0.0 {
+        ("dsnu_offset_e", offset_of_most(&hot).filter(|_| !is_told("dsnu_offset_e")))
+    } else {
+        ("dsnu_pixel_e", of_most(camera, 1, "dsnu_pixel_e"))
+    };
+    let dsnu_e = match of_others {
+        Some(of_others) => told.derived("dsnu_e", of_others / gain),
+        None => told.taken(camera, "dsnu_e", from),
+    };
+    let dcnu = all_dcnu.min(MOST_DCNU);
+    let (hot_pixel_share, hot_pixel_dark_current_e_per_s) = (0.0, 0.0);
+    Dark { dark_current_e_per_s: current, dcnu, dsnu_e, hot_pixel_share, hot_pixel_dark_current_e_per_s }
+}
+
+/// What single photosites that do not stand out differ by at no time, in samples, where darks of two times tell it.
+fn offset_of_most(hot: &[HotTail]) -> Option<f64> {
+    let offsets: Vec<f64> = hot.iter().filter_map(|tail| Some(tail.parted?[0])).collect();
+    (!offsets.is_empty()).then(|| (offsets.iter().sum::<f64>() / offsets.len() as f64).sqrt())
 }
 
 /// Spread between columns, or rows, of the pattern under light or in the dark behind the high-pass filter; 0 where it is not told

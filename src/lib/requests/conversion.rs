@@ -229,11 +229,9 @@ impl Conversion {
         {
             notes.push(Note::Warning(format!("{} {doubt}", file.display())));
         }
-        if let Some(doubt) = matrix.doubt_of_gain(frame.metadata.adu_per_e()) {
-            let shown =
-                self.matrix.as_ref().map_or("the matrix of its sensor".into(), |file| file.display().to_string());
-            notes.push(Note::Warning(format!("{}: {shown} {doubt}", frame.name)));
-        }
+        let shown = self.matrix.as_ref().map_or("the matrix of its sensor".into(), |file| file.display().to_string());
+        let of_codes = matrix.doubts_of_codes(&frame.metadata).into_iter();
+        notes.extend(of_codes.map(|doubt| Note::Warning(format!("{}: {shown} {doubt}", frame.name))));
         notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
         if let Some(file) = self.matrix.as_deref().filter(|_| matrix.is_relative()) {
             let text = format!("{}: XYZ are relative, Y = 1 for the white that saturates the camera", file.display());

@@ -1,16 +1,13 @@
 //! Corrections of a frame of codes before demosaicking.
 
 use super::border::measure_black;
-use super::dark_levels::{
-    doubt_of_border, doubt_of_dark, doubt_of_high, doubt_of_level, doubt_of_low, doubt_of_misfit, doubt_of_one,
-    doubt_of_scale, least_level, most_level, range_of,
-};
+use super::dark_levels::{DarkLevels, doubt_of_dark, doubt_of_one};
 use super::described::{Described, doubt_of_black};
 use super::independence::{Company, Role, check_contents, check_files};
 use super::notes::Note;
 use super::options::{Input, SensorChoice};
 use super::values::{self, BlackChoice};
-use crate::camera::levels::{BlackLevel, BlackLevels};
+use crate::camera::levels::BlackLevels;
 use crate::error::{Error, Result};
 use crate::formats::files::read_file;
 use crate::formats::input::{FrameReader, InputOptions, Linearizing, OfCamera};
@@ -100,14 +97,8 @@ pub struct OpenCorrection {
     pub corrections: Corrections<OneOfMany>,
     /// What came up.
     pub notes: Vec<Note>,
-    /// Black and white level of the frame, as far as darks are taken for such on trust.
-    range_adu: Option<[f64; 2]>,
-    /// What the mean of dark frames is at least.
-    least_adu: Option<f64>,
-    /// What it can well be at most, and what tells it.
-    most_adu: Option<(f64, &'static str)>,
-    /// The black level of a camera's frame whose dark signal no sensor tells.
-    black_adu: Option<f64>,
+    /// What the mean of dark frames can be.
+    levels: DarkLevels,
 }
 
 /// The frame that is corrected, where it comes from, and what is said of it.
@@ -368,9 +359,7 @@ impl Correction {
         remarks.extend(darks.iter().flat_map(|darks| darks.stack().remarks().to_vec()));
         let on_trust = darks.as_ref().and_then(|darks| darks.stack().taken_on_trust(frame));
         remarks.extend(on_trust.clone().filter(|text| !warnings.contains(text)));
-        let range_adu = on_trust.and_then(|_| range_of(frame));
-        let least_adu = least_level(frame, darks.as_ref().is_some_and(|darks| darks.stack().is_bias()));
-        let most_adu = darks.as_ref().and_then(|darks| most_level(frame, darks.stack()));
+        let levels = DarkLevels::of(frame, darks.as_ref().map(DarkFrames::stack), on_trust.is_some());
         let defects = self.defects_record(beyond, dark_limits.as_ref(), flats.is_some());
         let shares_masters = company.shares_darks().unwrap_or_else(|| {
             let problem =
@@ -385,8 +374,7 @@ impl Correction {
         warnings.extend(map.as_ref().and_then(|map| map.doubt(&list, frame)));
         notes.extend(warnings.into_iter().map(Note::Warning).chain(remarks.into_iter().map(Note::Remark)));
         let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
-        let black_adu = frame.metadata.black_level_adu.filter(|_| frame.metadata.adc.is_none()).map(BlackLevel::mean);
-        Ok(OpenCorrection { stage, corrections, notes, range_adu, least_adu, most_adu, black_adu })
+        Ok(OpenCorrection { stage, corrections, notes, levels })
     }
 
     /// Makes sure that no frame beside `light` is a copy of it, or of another.
@@ -472,16 +460,7 @@ impl OpenCorrection {
                 )
             }),
         ];
-        let means = darks.as_ref().and_then(DarkFrames::means);
-        let name = &self.header().name;
-        let low = means.zip(self.least_adu).and_then(|([_, dark], least)| doubt_of_low(name, dark, least));
-        let level = low.or_else(|| means.and_then(|means| doubt_of_level(name, means, self.range_adu)));
-        let misfit = || darks.as_ref().and_then(DarkFrames::misfit).map(|misfit| doubt_of_misfit(name, misfit));
-        let scale = || means.and_then(|[_, dark]| doubt_of_scale(name, dark, self.black_adu));
-        let high = || means.zip(self.most_adu).and_then(|([_, dark], most)| doubt_of_high(name, dark, most));
-        let border =
-            || darks.as_ref().and_then(DarkFrames::left_at_border).and_then(|left| doubt_of_border(name, left));
-        let level = level.or_else(misfit).or_else(scale).or_else(high).or_else(border);
+        let level = darks.as_ref().and_then(|darks| self.levels.doubt(&self.header().name, darks));
         let unlike = darks.as_ref().and_then(DarkFrames::unlike);
         let of_flats = flats.as_ref().and_then(|(flats, _)| flats.unlike_dark());
         let level = level.into_iter().chain(unlike.into_iter().chain(of_flats).map(doubt_of_one));

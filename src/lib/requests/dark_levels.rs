@@ -1,19 +1,73 @@
 //! What came off a frame and cannot well be its dark signal, by its mean.
 
-use crate::camera::levels::LEAST_OF_BIAS;
-use crate::metadata::{FrameHeader, Scene, TakenAs};
+use crate::camera::levels::{BlackLevel, LEAST_OF_BIAS};
+use crate::camera::readout::ReadOut;
+use crate::metadata::{FrameHeader, MasterKind, Scene, TakenAs};
 use crate::stages::bounds::Bounds;
-use crate::stages::darks::{DRIFT, DarkStack, Misfit};
+use crate::stages::darks::{DRIFT, DarkFrames, DarkStack, Misfit};
+use crate::stream::RowSource;
+
+/// What a frame and its sensor tell of the mean of its dark frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct DarkLevels {
+    /// Black and white level of the frame, as far as darks are taken for such on trust.
+    range_adu: Option<[f64; 2]>,
+    /// What it is at least.
+    least_adu: Option<f64>,
+    /// What it can well be at most, and what tells it.
+    most_adu: Option<(f64, &'static str)>,
+    /// The bias of the sensor that is named, and the dark signal above it that it predicts.
+    predicted_adu: Option<[f64; 2]>,
+    /// The black level of a camera's frame.
+    black_adu: Option<f64>,
+}
+
+impl DarkLevels {
+    /// Those of a frame and of what comes off it; `on_trust` where nothing tells that these are dark frames.
+    pub(super) fn of(frame: &FrameHeader, darks: Option<&DarkStack>, on_trust: bool) -> Self {
+        let metadata = &frame.metadata;
+        Self {
+            range_adu: range_of(frame).filter(|_| on_trust),
+            least_adu: least_level(frame, darks.is_some_and(DarkStack::is_bias)),
+            most_adu: darks.and_then(|darks| most_level(frame, darks)),
+            predicted_adu: darks.and_then(|darks| predicted_level(frame, darks)),
+            black_adu: metadata.black_level_adu.filter(|_| metadata.adc.is_none()).map(BlackLevel::mean),
+        }
+    }
+
+    /// Whether a mean is the dark signal that the sensor predicts, for half of what it has above the bias or more.
+    fn explains(&self, dark: f64) -> bool {
+        self.predicted_adu.is_some_and(|[bias, signal]| 2.0 * signal >= dark - bias)
+    }
+
+    /// What cannot well be of the dark signal of the frame `name`, by what came off it.
+    pub(super) fn doubt<S: RowSource>(&self, name: &str, darks: &DarkFrames<S>) -> Option<String> {
+        let misfit = || darks.misfit().map(|misfit| doubt_of_misfit(name, misfit));
+        let border = || darks.left_at_border().and_then(|left| doubt_of_border(name, left));
+        let below = || darks.below_zero().map(doubt_of_negatives);
+        let Some([frame, dark]) = darks.means() else { return misfit().or_else(border).or_else(below) };
+        let is_told = self.explains(dark);
+        let range_adu = self.range_adu.filter(|_| !is_told);
+        let black_adu = self.black_adu.filter(|_| !is_told);
+        let low = self.least_adu.and_then(|least| doubt_of_low(name, dark, least));
+        low.or_else(|| doubt_of_level(name, [frame, dark], range_adu))
+            .or_else(misfit)
+            .or_else(|| doubt_of_scale(name, dark, black_adu))
+            .or_else(|| self.most_adu.and_then(|most| doubt_of_high(name, dark, most)))
+            .or_else(border)
+            .or_else(below)
+    }
+}
 
 /// Black and white level of a frame, where both are known.
-pub(super) fn range_of(frame: &FrameHeader) -> Option<[f64; 2]> {
+fn range_of(frame: &FrameHeader) -> Option<[f64; 2]> {
     let [black, white] = [frame.metadata.black_level_adu?.largest(), frame.metadata.white_level_adu?.largest()];
     (white > black).then_some([black, white])
 }
 
 /// A warning of what came off a frame and cannot well be its dark signal: a mean above that of the frame, or, where nothing tells that
 /// it is one, far up on the way from black to white.
-pub(super) fn doubt_of_level(name: &str, [frame, dark]: [f64; 2], range_adu: Option<[f64; 2]>) -> Option<String> {
+fn doubt_of_level(name: &str, [frame, dark]: [f64; 2], range_adu: Option<[f64; 2]>) -> Option<String> {
     /// Dark frames are below this share of the range.
     const MOST_OF_RANGE: f64 = 0.25;
     if dark - frame > DRIFT[0].max(DRIFT[1] * dark.abs()) {
@@ -48,7 +102,7 @@ pub(super) fn doubt_of_dark(frame: &FrameHeader) -> Option<String> {
 /// What the mean of frames without light is at least, bias frames where `is_bias`: the bias less what noise takes, or, of cameras whose
 /// noise is not known, a share of the bias of the sensor that is named, or else of the black level. That may count the dark signal of the
 /// exposure, which bias frames lack.
-pub(super) fn least_level(frame: &FrameHeader, is_bias: bool) -> Option<f64> {
+fn least_level(frame: &FrameHeader, is_bias: bool) -> Option<f64> {
     /// So many times the bias may a black level be that counts dark signal.
     const MOST_OF_BIAS: f64 = 10.0;
     let by_converter = Bounds::of(frame).and_then(|bounds| bounds.mean);
@@ -66,7 +120,7 @@ pub(super) fn least_level(frame: &FrameHeader, is_bias: bool) -> Option<f64> {
 
 /// What the mean of dark frames of a frame can well be at most, ADU, and what tells it: the bias of its sensor and ten times the dark
 /// signal, as sensors of one model and temperatures that nobody told differ; or its black level, where no time is left for dark signal.
-pub(super) fn most_level(frame: &FrameHeader, darks: &DarkStack) -> Option<(f64, &'static str)> {
+fn most_level(frame: &FrameHeader, darks: &DarkStack) -> Option<(f64, &'static str)> {
     /// Levels are told to such a share, and to so many ADU.
     const NEAR: [f64; 2] = [0.02, 4.0];
     /// The same of black levels of cameras.
@@ -80,11 +134,7 @@ pub(super) fn most_level(frame: &FrameHeader, darks: &DarkStack) -> Option<(f64,
         let own = (metadata.time_s(), metadata.temperature_k());
         let masters = darks.masters();
         let of_masters = masters.iter().map(|master| (master.exposure_s.or(own.0), master.temperature_k.or(own.1)));
-        let dark_e = |(time_s, temperature_k): (Option<f64>, Option<f64>)| {
-            let charges = readout.dark_charges_e(temperature_k.unwrap_or(readout.temperature_k), time_s)?;
-            Some(charges[0] + readout.hot_pixel_share * charges[1])
-        };
-        let doses = std::iter::once(own).chain(of_masters).map(dark_e);
+        let doses = std::iter::once(own).chain(of_masters).map(|conditions| dark_charge_e(readout, conditions));
         let most_e =
             if darks.is_bias() { 0.0 } else { doses.into_iter().try_fold(0.0, |most: f64, e| Some(most.max(e?)))? };
         let slope = metadata.adu_per_e().unwrap_or(readout.adu_per_e);
@@ -96,8 +146,30 @@ pub(super) fn most_level(frame: &FrameHeader, darks: &DarkStack) -> Option<(f64,
     Some((off(black.largest(), NEAR_BLACK), "black level"))
 }
 
+/// The mean dark charge of a sensor, of a time in s and a temperature in K, or that of its read-out; none where the time is to be known.
+fn dark_charge_e(readout: &ReadOut, (time_s, temperature_k): (Option<f64>, Option<f64>)) -> Option<f64> {
+    let [ordinary, hot] = readout.dark_charges_e(temperature_k.unwrap_or(readout.temperature_k), time_s)?;
+    Some(ordinary + readout.hot_pixel_share * hot)
+}
+
+/// The bias of the sensor that is named, and the dark signal that it predicts of what comes off, ADU; of dark frames that do not tell
+/// their time or temperature, at those of the frame.
+fn predicted_level(frame: &FrameHeader, darks: &DarkStack) -> Option<[f64; 2]> {
+    let metadata = &frame.metadata;
+    let readout = metadata.sensor.as_ref()?.readout.as_ref()?;
+    let own = (metadata.time_s(), metadata.temperature_k());
+    let masters = darks.masters();
+    let of_kind = masters.iter().filter(|master| master.kind == MasterKind::Dark);
+    let charge_e = of_kind.map(|master| {
+        let conditions = (master.exposure_s.or(own.0), master.temperature_k.or(own.1));
+        dark_charge_e(readout, conditions).map(|e| master.weight * e)
+    });
+    let slope = metadata.adu_per_e().unwrap_or(readout.adu_per_e);
+    Some([metadata.bias_adu().unwrap_or(readout.bias_adu), slope * charge_e.sum::<Option<f64>>()?])
+}
+
 /// A warning of what came off a frame and lies above what dark frames of it read.
-pub(super) fn doubt_of_high(name: &str, dark: f64, (most, by): (f64, &str)) -> Option<String> {
+fn doubt_of_high(name: &str, dark: f64, (most, by): (f64, &str)) -> Option<String> {
     (dark > most).then(|| {
         format!(
             "{name}: what came off has a mean of {dark:.1} ADU, and by the frame's {by} dark frames have {most:.1} ADU at most; did light fall \
@@ -114,7 +186,7 @@ pub(super) fn doubt_of_one((name, [mean, median]): (&str, [f64; 2])) -> String {
 }
 
 /// A warning of what is left of photosites that no light reaches.
-pub(super) fn doubt_of_border(name: &str, [left, deviation]: [f64; 2]) -> Option<String> {
+fn doubt_of_border(name: &str, [left, deviation]: [f64; 2]) -> Option<String> {
     /// Black levels drift by less from frame to frame, ADU.
     const DRIFT_ADU: f64 = 4.0;
     const Z: f64 = 8.0;
@@ -126,7 +198,7 @@ pub(super) fn doubt_of_border(name: &str, [left, deviation]: [f64; 2]) -> Option
 }
 
 /// A warning of what came off a frame whose bias it does not reach.
-pub(super) fn doubt_of_low(name: &str, dark: f64, least: f64) -> Option<String> {
+fn doubt_of_low(name: &str, dark: f64, least: f64) -> Option<String> {
     (dark < least).then(|| {
         format!(
             "{name}: what came off has a mean of {dark:.1} ADU, and by the frame's metadata dark and bias frames have {least:.1} ADU \
@@ -135,8 +207,16 @@ pub(super) fn doubt_of_low(name: &str, dark: f64, least: f64) -> Option<String> 
     })
 }
 
+/// A warning of dark frames with samples below zero.
+fn doubt_of_negatives((name, share): (&str, f64)) -> String {
+    format!(
+        "{name}: {:.0} % of its samples are below zero, as no camera writes them; was a bias taken off? What it lacks stays in the frame",
+        100.0 * share
+    )
+}
+
 /// A warning of what came off a frame and cannot well be dark frames of it, by the samples of both.
-pub(super) fn doubt_of_misfit(name: &str, misfit: Misfit) -> String {
+fn doubt_of_misfit(name: &str, misfit: Misfit) -> String {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     match misfit {
         Misfit::Below(share) => format!(
@@ -155,7 +235,7 @@ pub(super) fn doubt_of_misfit(name: &str, misfit: Misfit) -> String {
 }
 
 /// A warning of what came off a frame and is a few times its black level, as frames of another number of bits are.
-pub(super) fn doubt_of_scale(name: &str, dark: f64, black: Option<f64>) -> Option<String> {
+fn doubt_of_scale(name: &str, dark: f64, black: Option<f64>) -> Option<String> {
     /// Numbers of bits differ by no more.
     const MOST_BITS: i32 = 4;
     /// Black levels are told, and dark signals are small, to this share.

@@ -253,13 +253,22 @@ pub fn either<T: PartialEq + Copy + Display>(cfa: Option<T>, pattern: Option<T>)
 /// What no code of a camera is above: of converters of more than 16 bits the white level is to be told.
 const LARGEST_CODE: f64 = 65_535.0;
 
-/// A warning of a level to subtract that is not what the metadata say of no light.
+/// A warning of a level to subtract that is not what the metadata say of no light, or far from the bias of the sensor that is named.
 ///
 /// # Errors
 ///
 /// [`Error::Usage`] for one that is not below the white level, or where none is known the codes of 16 bits.
 pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>> {
-    let Black::Level(black) = black else { return Ok(None) };
+    let black = match black {
+        Black::None => return Ok(None),
+        Black::Auto => {
+            let known = frame.black_levels()?.filter(|known| !known.has_deltas()).map(|known| known.level());
+            return Ok(known.and_then(|known| {
+                of_another_sensor(frame, known, &format!("its black level, {} ADU,", in_words(&known.sites())))
+            }));
+        }
+        Black::Level(black) => black,
+    };
     let (level, said) = (black.largest(), in_words(&black.sites()));
     let white = frame.metadata.white_level_adu.map(|white| white.largest());
     let are_codes = matches!(frame.metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
@@ -272,29 +281,23 @@ pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>>
             format!("{}: --black {said} is not below {LARGEST_CODE}, the largest code of 16 bits", frame.name);
         return Err(Error::Usage(problem).change(&["black"]));
     }
-    Ok(other_black(frame, black).or_else(|| of_another_sensor(frame, black)))
+    Ok(other_black(frame, black).or_else(|| of_another_sensor(frame, black, &format!("--black {said}"))))
 }
 
 /// A warning of a level to subtract from codes of a camera that is far from the bias of the sensor which is named; what it counts of dark
-/// signal is a small share of the range.
-fn of_another_sensor(frame: &FrameHeader, black: BlackLevel) -> Option<Note> {
+/// signal is a small share of the range. `said` is what the level is called.
+fn of_another_sensor(frame: &FrameHeader, black: BlackLevel, said: &str) -> Option<Note> {
     let metadata = &frame.metadata;
     let are_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
-    if !are_codes || metadata.adc.is_some() || metadata.black_level_adu.is_some() || metadata.correction.is_some() {
+    if !are_codes || metadata.adc.is_some() || metadata.correction.is_some() {
         return None;
     }
     let sensor = metadata.sensor.as_ref()?;
     let readout = sensor.readout.as_ref()?;
     let (level, bias) = (black.mean(), readout.bias_adu);
     let [least, most] = levels_of_bias(bias, f64::from((1_u32 << readout.bits) - 1));
-    (level < least || level > most).then(|| {
-        Note::Warning(format!(
-            "{}: --black {} is far from the bias of {}, {bias} ADU",
-            frame.name,
-            in_words(&black.sites()),
-            sensor.name
-        ))
-    })
+    (level < least || level > most)
+        .then(|| Note::Warning(format!("{}: {said} is far from the bias of {}, {bias} ADU", frame.name, sensor.name)))
 }
 
 /// A warning of a level to subtract that the metadata contradict.

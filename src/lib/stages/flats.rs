@@ -17,6 +17,7 @@ use crate::stages::saturation::{DEFECTIVE, FullLevels, SATURATED};
 use crate::stages::sites::SiteClasses;
 use crate::stages::transfer::{Passage, Transfer};
 use crate::stream::RowSource;
+use std::f64::consts::PI;
 use std::ops::Range;
 
 /// What no light reads in flats.
@@ -46,7 +47,7 @@ pub struct FlatFrames<S> {
 /// What a first reading of flats tells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlatMeans {
-    /// Mean of each class above what no light reads, where all classes are whole, ADU.
+    /// Mean of each class above what no light reads, where all classes are whole, ADU; 0 of a class without a photosite.
     means: Vec<f64>,
     /// How many photosites of each class these are the means of, and how many good ones beside them.
     photosites: Vec<u64>,
@@ -76,7 +77,11 @@ struct Tally {
     /// Photosites that are neither saturated nor defective, in whole cells and beside them.
     good: Vec<u64>,
     full: Vec<u64>,
-    lit: Vec<u64>,
+    finite: Vec<u64>,
+    /// Sizes of the differences between photosites of a class and the next ones in rows of whole cells: their sum, and how many.
+    changes: Vec<[f64; 2]>,
+    /// The last photosite of each class in a row.
+    last: Vec<Option<f64>>,
     /// Whether each cell of a row of cells is whole.
     whole: Vec<bool>,
 }
@@ -84,7 +89,36 @@ struct Tally {
 impl Tally {
     fn new(classes: usize) -> Self {
         let none = || vec![0; classes];
-        Self { sums: vec![0.0; classes], counts: none(), good: none(), full: none(), lit: none(), whole: Vec::new() }
+        Self {
+            sums: vec![0.0; classes],
+            counts: none(),
+            good: none(),
+            full: none(),
+            finite: none(),
+            changes: vec![[0.0; 2]; classes],
+            last: vec![None; classes],
+            whole: Vec::new(),
+        }
+    }
+
+    /// Takes in a photosite of a class in a whole cell, right of those before in its row.
+    fn take(&mut self, class: usize, flat: f64) {
+        self.sums[class] += flat;
+        self.counts[class] += 1;
+        if let Some(before) = self.last[class].replace(flat) {
+            let [sum, count] = self.changes[class];
+            self.changes[class] = [sum + (flat - before).abs(), count + 1.0];
+        }
+    }
+
+    /// The standard deviation of a class by the differences of neighbors, which slopes and dark corners leave alone; none of few.
+    ///
+    /// σ = √π/2 ⟨|x − x′|⟩        of normal noise
+    fn scatter(&self, class: usize) -> Option<f64> {
+        /// So many tell it to about 10 %.
+        const LEAST: f64 = 64.0;
+        let [sum, count] = self.changes[class];
+        (count >= LEAST).then(|| 0.5 * PI.sqrt() * sum / count)
     }
 }
 
@@ -281,7 +315,7 @@ impl<S: RowSource> FlatFrames<S> {
                 let is_full = is_full(self.full, x, y, plane, *largest);
                 let is_ordinary = limits.is_none_or(|limits| (limits[class][0]..=limits[class][1]).contains(flat));
                 let is_good = flat.is_finite() && !is_full && is_ordinary && marks[row * width + x] == 0.0;
-                tally.lit[class] += u64::from(flat.is_finite());
+                tally.finite[class] += u64::from(flat.is_finite());
                 tally.full[class] += u64::from(flat.is_finite() && is_full);
                 tally.good[class] += u64::from(is_good);
                 if let Some(whole) = tally.whole.get_mut(x / columns) {
@@ -291,12 +325,14 @@ impl<S: RowSource> FlatFrames<S> {
         }
         for (row, plane) in lines {
             let of_row = self.classes.row(first + row, plane);
-            let flats = self.made[(row * planes + plane) * width..][..width].chunks_exact(columns);
-            for (cell, flats) in flats.enumerate().filter(|(cell, _)| tally.whole.get(*cell) == Some(&true)) {
+            tally.last.fill(None);
+            for (cell, flats) in self.made[(row * planes + plane) * width..][..width].chunks_exact(columns).enumerate()
+            {
+                if tally.whole.get(cell) != Some(&true) {
+                    continue;
+                }
                 for (x, flat) in flats.iter().enumerate() {
-                    let class = of_row[(cell * columns + x) % of_row.len()];
-                    tally.sums[class] += flat;
-                    tally.counts[class] += 1;
+                    tally.take(of_row[(cell * columns + x) % of_row.len()], *flat);
                 }
             }
         }
@@ -313,27 +349,33 @@ impl<S: RowSource> FlatFrames<S> {
 
     /// The means of what was taken in.
     fn judged(&self, tally: &Tally, limits: Option<Vec<[f64; 2]>>) -> Result<FlatMeans> {
-        let Tally { sums, counts, good, full, lit, .. } = tally;
+        let Tally { sums, counts, good, full, finite, .. } = tally;
         let classes = 0..self.classes.count();
-        if classes.clone().any(|class| 2 * full[class] > lit[class]) {
+        if classes.clone().any(|class| 2 * full[class] > finite[class]) {
             return Err(self
                 .head
                 .refuse("most samples of a class are saturated; expose flat fields to half of full well"));
         }
-        if good.iter().any(|good| *good > 0) && counts.iter().all(|count| *count == 0) {
+        // A class that a crop has no photosite of has no cell either.
+        if classes.clone().any(|class| finite[class] > 0 && counts[class] == 0)
+            || counts.iter().all(|count| *count == 0)
+        {
             return Err(self.head.refuse(
                 "nowhere are the photosites of all classes side by side neither saturated nor defective; expose flat fields to half of \
                  full well",
             ));
         }
-        let means: Vec<f64> = sums.iter().zip(counts).map(|(sum, count)| sum / *count as f64).collect();
-        for class in classes {
-            if counts[class] > 0 && (means[class].is_nan() || means[class] <= 0.0) {
-                return Err(self.head.refuse(format!(
-                    "its mean is {:.1} ADU above what no light reads; a flat field is lit",
-                    means[class]
-                )));
-            }
+        let means: Vec<f64> = sums.iter().zip(counts).map(|(sum, count)| sum / (*count).max(1) as f64).collect();
+        for class in classes.filter(|class| counts[*class] > 0) {
+            let mean = means[class];
+            let scattering = match tally.scatter(class) {
+                _ if mean.is_nan() || mean <= 0.0 => String::new(),
+                Some(scatter) if scatter > mean => format!(", and scatters by {scatter:.1} ADU"),
+                _ => continue,
+            };
+            return Err(self.head.refuse(format!(
+                "its mean is {mean:.1} ADU above what no light reads{scattering}; a flat field is lit"
+            )));
         }
         let left_out = good.iter().zip(counts).map(|(good, count)| good - count).collect();
         Ok(FlatMeans { means, photosites: counts.clone(), left_out, full: full.iter().sum(), limits })

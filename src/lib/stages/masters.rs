@@ -104,25 +104,29 @@ struct Level {
     count: f64,
     sum: f64,
     squares: f64,
+    /// How many are below zero.
+    below_zero: f64,
 }
 
 impl Level {
     /// Takes in samples, in lanes of their own so that one sum need not wait for another.
     fn take(&mut self, samples: &[f32]) {
         const LANES: usize = 8;
-        let mut lanes = [[0.0_f64; LANES]; 3];
+        let mut lanes = [[0.0_f64; LANES]; 4];
         for chunk in samples.chunks(LANES) {
             for (lane, sample) in chunk.iter().enumerate() {
                 let (one, sample) = if sample.is_finite() { (1.0, f64::from(*sample)) } else { (0.0, 0.0) };
                 lanes[0][lane] += one;
                 lanes[1][lane] += sample;
                 lanes[2][lane] += sample * sample;
+                lanes[3][lane] += if sample < 0.0 { 1.0 } else { 0.0 };
             }
         }
-        let [count, sum, squares] = lanes.map(|lane| lane.iter().sum::<f64>());
+        let [count, sum, squares, below_zero] = lanes.map(|lane| lane.iter().sum::<f64>());
         self.count += count;
         self.sum += sum;
         self.squares += squares;
+        self.below_zero += below_zero;
     }
 }
 
@@ -155,12 +159,21 @@ impl<S: RowSource> Frames<S> {
         let median = f64::midpoint(*means.get(means.len().checked_sub(1)? / 2)?, means[means.len() / 2]);
         let off = |index: &usize| (of_frames[*index] - median).abs();
         let farthest = (0..of_frames.len()).max_by(|a, b| off(a).total_cmp(&off(b)))?;
-        let Level { count, sum, squares } = self.levels[farthest];
+        let Level { count, sum, squares, .. } = self.levels[farthest];
         let head = self.frames[farthest].header();
         let lines = head.geometry.width.min(head.geometry.height).max(1) as f64;
         let scatter = (squares / count - (sum / count).powi(2)).max(0.0);
         let allowed = DRIFT[0].max(DRIFT[1] * median.abs()) + Z * (scatter / lines).sqrt();
         (off(&farthest) > allowed).then(|| (head.name.as_str(), [of_frames[farthest], median]))
+    }
+
+    /// The first frame that has more samples below zero so far than codes of a camera do, and their share.
+    pub fn below_zero(&self) -> Option<(&str, f64)> {
+        /// Programs that average codes, or take out what stands out, leave fewer.
+        const MOST: f64 = 0.05;
+        let shares = self.levels.iter().map(|level| level.below_zero / level.count);
+        let (frame, share) = self.frames.iter().zip(shares).find(|(_, share)| *share > MOST)?;
+        Some((frame.header().name.as_str(), share))
     }
 
     /// Each of them.

@@ -118,7 +118,7 @@ impl Counts {
             (if only_met { self.saturated_samples } else { 0 }, "samples are saturated, at full well or the white level"),
             (
                 self.saturated_pixels,
-                "pixels were made of saturated samples: their values are wrong, and their uncertainty, which --sigma tells, is \
+                "pixels were made of saturated samples: their values are wrong, and their uncertainty is \
                  infinite",
             ),
             (self.defective - self.corrected.min(self.defective), "defective photosites were not interpolated: no neighbor of their class is good"),

@@ -11,7 +11,10 @@ pub fn unit_of_heading(heading: &str) -> Option<Stated> {
     }
     let found = of_name_and_unit(heading)?;
     let contradicts = match &found {
-        Stated::Radiance(_) => names(heading, &IRRADIANCES) && !names(heading, &RADIANCE) || names(heading, &PHOTONS),
+        Stated::Radiance(_) => {
+            let is_other = names(heading, &IRRADIANCES) || names(heading, &RATIOS);
+            is_other && !names(heading, &RADIANCE) || names(heading, &PHOTONS)
+        }
         Stated::Other { kind: OtherUnit::Irradiance, .. } => names(heading, &RADIANCE) && !names(heading, &IRRADIANCES),
         Stated::Other { .. } => false,
     };
@@ -40,7 +43,7 @@ fn changed(heading: &str) -> Option<OtherUnit> {
     names(heading, &NORMALIZED).then_some(OtherUnit::Relative)
 }
 
-const NORMALIZED: [&str; 2] = ["normalized", "normalised"];
+const NORMALIZED: [&str; 3] = ["normalized", "normalised", "relative"];
 
 /// What a unit, or a name, is that is made of no powers of light.
 fn by_name(text: &str) -> OtherUnit {
@@ -125,6 +128,8 @@ fn of_name_and_unit(heading: &str) -> Option<Stated> {
             (word, _) if MEANS.contains(&word) => named(OtherUnit::Mean),
             (word, _) if RATIOS.contains(&word) => named(OtherUnit::Ratio),
             (_, Some(Base::Photons)) => named(OtherUnit::Photons),
+            // One letter is a name.
+            (word, _) if READINGS.contains(&word) && word.len() > 1 && tokens.len() == 1 => named(OtherUnit::Reading),
             _ => None,
         })
     };
@@ -203,7 +208,11 @@ fn names_unit_in_words(heading: &str) -> bool {
 }
 
 /// Words that multiply.
-const FACTORS_IN_WORDS: [&str; 15] = [
+const FACTORS_IN_WORDS: [&str; 19] = [
+    "scale",
+    "scaling",
+    "factor",
+    "pi",
     "times",
     "scaled",
     "multiplied",
@@ -237,6 +246,9 @@ fn beside_factor(heading: &str, outside: &str) -> Option<Stated> {
     let is_large = |text: &str| {
         is_power(text) || text.parse::<f64>().is_ok_and(|factor| factor >= 10.0 || factor > 0.0 && factor < 1.0)
     };
+    if is_multiple_of_name(outside) {
+        return Some(Stated::Other { text: heading.trim().to_owned(), kind: OtherUnit::BesideFactor });
+    }
     let is_sign = |place: usize| words.get(place).is_some_and(|word| ["x", "*"].contains(word));
     let is_factor = words.iter().enumerate().any(|(place, word)| {
         let number = word.trim_start_matches(['x', '*']);
@@ -247,6 +259,37 @@ fn beside_factor(heading: &str, outside: &str) -> Option<Stated> {
             || is_signed && is_large(number)
     });
     is_factor.then(|| Stated::Other { text: heading.trim().to_owned(), kind: OtherUnit::BesideFactor })
+}
+
+/// Whether what stands outside a unit is a multiple of the name: `2L`, `L/2`, `1000 L`, `-L`, `πL`, `L^2`, or ends with a power of ten,
+/// `E-3`, `(1000)`, `10⁻³`.
+fn is_multiple_of_name(outside: &str) -> bool {
+    const NAMES: [&str; 3] = ["l", "radiance", "rad"];
+    let text = outside.to_lowercase().replace("()", " ").replace("[]", " ");
+    let text = text.trim();
+    if text.contains('π') || text.contains("10⁻") || text.contains("10⁺") {
+        return true;
+    }
+    let number = |part: &str| part.trim().parse::<f64>().is_ok_and(|factor| factor != 1.0);
+    let is_name = |part: &str| NAMES.contains(&part.trim());
+    let is_product =
+        |sign: char| text.split_once(sign).is_some_and(|(a, b)| is_name(a) && number(b) || is_name(b) && number(a));
+    // `radiance 2` is a name.
+    let is_before_name = text.split_once(' ').is_some_and(|(a, b)| number(a) && is_name(b));
+    let is_negative = text.strip_prefix('-').is_some_and(is_name);
+    if ['*', '·', '×', '/', '^'].into_iter().any(is_product) || is_before_name || is_negative {
+        return true;
+    }
+    let digits = text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+    if digits.len() < text.len() && is_name(digits) {
+        return true;
+    }
+    let last = text.split_whitespace().last().unwrap_or_default();
+    let exponent = last.strip_prefix('e').map(|rest| rest.trim_start_matches(['+', '-']));
+    let is_exponent = exponent.is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|byte| byte.is_ascii_digit()));
+    let bracketed = last.strip_prefix(['(', '[']).and_then(|rest| rest.strip_suffix([')', ']']));
+    let is_power = |factor: f64| factor > 0.0 && (factor >= 1000.0 || factor <= 0.1) && factor.log10().fract() == 0.0;
+    last.len() < text.len() && is_exponent || bracketed.is_some_and(|text| text.parse::<f64>().is_ok_and(is_power))
 }
 
 /// What stands in the last brackets of a heading, brackets in them included.
@@ -328,6 +371,46 @@ fn looks_like_a_unit(text: &str) -> bool {
 mod tests {
     use super::*;
     use crate::units::RadianceUnit;
+
+    #[test]
+    fn multiples_of_a_radiance_are_told() {
+        let unit = "(W m-2 sr-1 nm-1)";
+        for heading in [
+            format!("radiance {unit} E-3"),
+            format!("L {unit} e3"),
+            format!("L {unit} 10⁻³"),
+            format!("L {unit} (1000)"),
+            format!("L {unit}, scale 0.001"),
+            format!("scale factor 0.001 radiance {unit}"),
+            format!("1000 L {unit}"),
+            format!("2L {unit}"),
+            format!("L/2 {unit}"),
+            format!("πL {unit}"),
+            format!("pi*L {unit}"),
+            format!("L {unit}/pi"),
+            format!("L^2 {unit}"),
+            format!("-L {unit}"),
+            "L W m-2 sr-1 nm-1 E-3".into(),
+        ] {
+            let found = unit_of_heading(&heading);
+            let is_told = matches!(found, Some(Stated::Other { kind: OtherUnit::BesideFactor, .. }));
+            assert!(is_told, "{heading}: {found:?}");
+        }
+        for heading in
+            ["L", "L1", "L 1", "L-2", "sky 12", "30 deg", "0°", "sza30", "E3 sky", "radiance 2", "L_350", "scan 1000"]
+        {
+            let found = unit_of_heading(&format!("{heading} {unit}"));
+            assert!(matches!(found, Some(Stated::Radiance(_))), "{heading}: {found:?}");
+        }
+        let reflected = unit_of_heading(&format!("reflectance {unit}"));
+        assert!(matches!(reflected, Some(Stated::Other { kind: OtherUnit::Contradiction, .. })), "{reflected:?}");
+        for (heading, wanted) in
+            [("counts", OtherUnit::Reading), ("DN", OtherUnit::Reading), ("relative radiance", OtherUnit::Relative)]
+        {
+            let found = unit_of_heading(heading);
+            assert!(matches!(&found, Some(Stated::Other { kind, .. }) if *kind == wanted), "{heading}: {found:?}");
+        }
+    }
 
     #[test]
     fn a_factor_beside_the_unit_is_told() {

@@ -1,5 +1,6 @@
 //! Characterization: the matrix from camera signals to XYZ, fitted on known radiances or on the responses alone.
 
+mod codes;
 pub mod evaluation;
 pub mod noise_aware;
 pub mod regression;
@@ -11,7 +12,7 @@ use crate::camera::response::SpectralResponse;
 use crate::camera::sensor::{ResponseFiles, Sensor};
 use crate::color::difference::DifferenceReport;
 use crate::error::{Error, Result};
-use crate::metadata::{MatrixResidual, RelativeMatrix};
+use crate::metadata::{CameraSettings, MatrixResidual, RelativeMatrix};
 use crate::spectrum::{Observer, SpectralLibrary, WavelengthGrid, fold};
 use crate::units::{CM2_PER_M2, LUMINOUS_EFFICACY_LM_PER_W};
 use nalgebra::DMatrix;
@@ -49,6 +50,15 @@ pub struct CameraMatrix {
     /// Slope of the converter that it is for, ADU per e⁻, where it is known; XYZ that are relative do not depend on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub adu_per_e: Option<f64>,
+    /// The sensitivity of the frame that absolute XYZ were fitted to, ISO.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub iso_speed: Option<f64>,
+    /// What its camera was set to besides, in its own units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_settings: Option<CameraSettings>,
+    /// White level less black level of the frame that it was fitted to, ADU.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range_adu: Option<f64>,
     /// Unit of the elements.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
@@ -112,19 +122,6 @@ impl CameraMatrix {
         Some(format!("was fitted for another {differs} than that of the sensor {}", sensor.name))
     }
 
-    /// What XYZ are off by, in words, of codes of such a slope in ADU per e⁻; none where it is that of the matrix, or nobody knows.
-    pub fn doubt_of_gain(&self, adu_per_e: Option<f64>) -> Option<String> {
-        /// Slopes that differ by no more are one, written with other digits.
-        const SAME_SLOPE: f64 = 1e-6;
-        let (own, other) = self.adu_per_e.filter(|_| !self.is_relative()).zip(adu_per_e)?;
-        let ratio = other / own;
-        ((ratio - 1.0).abs() > SAME_SLOPE).then(|| {
-            format!(
-                "is for {own} ADU per electron, and the codes have {other}: XYZ come out {ratio:.4} times what they are"
-            )
-        })
-    }
-
     /// A matrix of which no more is known.
     pub fn bare(unit: &str, xyz_from_camera: [[f64; 3]; 3]) -> Self {
         Self {
@@ -135,6 +132,9 @@ impl CameraMatrix {
             pixel_pitch_um: None,
             method: None,
             adu_per_e: None,
+            iso_speed: None,
+            camera_settings: None,
+            range_adu: None,
             unit: Some(unit.into()),
             xyz_from_camera,
             white_xy: None,
@@ -284,8 +284,11 @@ impl CameraMatrix {
         {
             return Err(format!("its unit is `{unit}`; understood are `{MATRIX_UNIT}` and `{RELATIVE_MATRIX_UNIT}`"));
         }
-        if let Some(slope) = self.adu_per_e.filter(|slope| !(*slope > 0.0 && slope.is_finite())) {
-            return Err(format!("`adu_per_e` is {slope}; it must be above 0"));
+        let numbers = [("adu_per_e", self.adu_per_e), ("iso_speed", self.iso_speed), ("range_adu", self.range_adu)];
+        for (key, number) in numbers {
+            if let Some(number) = number.filter(|number| !(*number > 0.0 && number.is_finite())) {
+                return Err(format!("`{key}` is {number}; it must be above 0"));
+            }
         }
         if crate::color::matrix(&self.xyz_from_camera).try_inverse().is_none() {
             return Err("its `xyz_from_camera` is singular: three signals would not give three stimuli".into());

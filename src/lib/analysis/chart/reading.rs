@@ -116,6 +116,11 @@ impl ChartReader {
         Ok(Self { grid, pattern, origin, black, full: full.classes(), range, width, next_row: 0, sums })
     }
 
+    /// White level less black level of the frame, ADU, of which signals are shares.
+    pub fn range_adu(&self) -> f64 {
+        self.range
+    }
+
     /// Takes the next rows of the frame.
     pub fn take(&mut self, rows: &[f32]) {
         for row in rows.chunks_exact(self.width) {

@@ -1,6 +1,6 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
-use super::curve::{Curve, SAME_TIME, Values, below_saturation, stuck_shares, without_stuck};
+use super::curve::{Curve, SAME_TIME, Values, below_saturation, stuck_shares, without_clipped, without_stuck};
 use super::dark::{doubling_temperature, parted_pattern, pixel_noise};
 use super::doubts::doubts;
 use super::level::Level;
@@ -31,9 +31,13 @@ pub fn of_class(
     // Photosites that are stuck at an end of the codes cut nothing off.
     let stuck = stuck_shares(flats, darks);
     let [flats, darks, all_darks] = [flats, darks, all_darks].map(|levels| without_stuck(levels, stuck));
+    // Nor do darks that code 0 cuts off count where others tell what they would.
+    let ((darks, is_left_out), clipped) = (without_clipped(&darks, &flats, rounding), darks.len());
+    let clipped = clipped - darks.len();
     let (flats, darks, all_darks) = (&flats[..], &darks[..], &all_darks[..]);
     let below: Vec<&Level> = below_saturation(flats).into_iter().map(|flat| &flats[flat]).collect();
-    let scatter = Scatter::of(&below, all_darks);
+    let steady = if is_left_out { without_clipped(all_darks, flats, rounding).0 } else { all_darks.to_vec() };
+    let scatter = Scatter::of(&below, &steady);
     let curve_of = |levels: [&[Level]; 2]| {
         Curve::of(levels[0], levels[1], &scatter, settings).filter(|curve| curve.values().is_some())
     };
@@ -56,7 +60,7 @@ pub fn of_class(
     let mut found = Vec::new();
     let mut add = |key: &'static str, result: Found| found.push(finding(key, result));
     let number = |of: &dyn Fn(&Values) -> Option<f64>, why: String| curve.interval(of, confidence).ok_or(why);
-    let reasons = Reasons { curve: &curve, flats, darks, all_darks };
+    let reasons = Reasons { curve: &curve, flats, darks, all_darks, is_left_out };
     let (no_darks, no_photons) = (|| reasons.of_darks(), || reasons.of_photons());
     let gain = number(&|v| Some(v.gain), String::new());
     add("gain_adu_per_e", gain.clone());
@@ -150,7 +154,13 @@ pub fn of_class(
     }
     let (curve_points, values) = (points.collect(), curve.values());
     let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames), &limit);
-    let suspects = suspects(Some(&curve), flats, all_darks, &scatter);
+    if is_left_out {
+        let times = if clipped == 1 { "one exposure time".to_owned() } else { format!("{clipped} exposure times") };
+        notes.push(format!(
+            "darks of {times} are clipped at code 0 and left out: black level, dark noise and dark current are told by the others"
+        ));
+    }
+    let suspects = suspects(Some(&curve), flats, all_darks, &scatter, rounding);
     let mut doubts = doubts(&curve, flats, &suspects, confidence);
     if let [Some((_, lit)), Some((_, dark))] = stacks
         && !is_same_time(lit, dark)
@@ -331,6 +341,13 @@ fn notes(curve: &Curve, flats: &[Level], frames: Option<usize>, limit: &Limit) -
         notes.push(format!(
             "the variance of no light is that which the line through the flats has at {end}{of_gain}, as darks do not tell it"
         ));
+    }
+    if curve.are_darks_clipped {
+        notes.push(
+            "darks are clipped at code 0, and too few others tell the dark charge: the gain is the slope of the variance over the mean \
+             itself, which has that in it"
+                .into(),
+        );
     }
     notes.extend(curve.values().and_then(|values| values.dark_variance).and(curve.time_of_noise()).map(time_of_noise));
     let lit = flats.iter().filter(|flat| flat.condition.photons.is_none()).count();

@@ -4,7 +4,7 @@
 //! its photosites: n of N that stand out by d_i > T make H = mean of d_i − T, and the share n/N e^(T/H). What most differ by, by their
 //! median absolute deviation, is the dark current non-uniformity without the hot ones.
 
-use super::curve::are_whole;
+use super::curve::{are_whole, is_clipped};
 use super::level::Level;
 use super::sites::Site;
 use super::view::{Blur, OUTSTANDING};
@@ -25,6 +25,23 @@ pub struct HotTail {
     pub count: usize,
     /// What all others differ by in these darks, a variance, without the noise that is left in the mean of the frames.
     pub others: f64,
+    /// The same of single photosites alone parted into what no time adds and what goes by it: variances in samples², and per second²,
+    /// where darks of two times tell it.
+    pub parted: Option<[f64; 2]>,
+}
+
+/// What photosites differ by, a variance each, in darks of two exposure times in s, parted into what no time adds and what goes by it.
+pub fn parted([(short_s, short), (long_s, long)]: [(f64, f64); 2]) -> Option<[f64; 2]> {
+    let between = long_s * long_s - short_s * short_s;
+    let per_s2 = ((long - short) / between).max(0.0);
+    (between > 0.0).then(|| [(short - per_s2 * short_s * short_s).max(0.0), per_s2])
+}
+
+/// The dark of the shortest time, of which code 0 cuts off none, of codes whose error of rounding has such a variance.
+pub fn dark_of_offset(darks: &[Level], rounding: f64) -> Option<&Level> {
+    let timed = darks.iter().filter(|dark| dark.condition.exposure_s.is_some() && !is_clipped(dark, rounding));
+    let time = |dark: &Level| dark.condition.exposure_s.unwrap_or(0.0);
+    timed.min_by(|a, b| time(a).total_cmp(&time(b)))
 }
 
 /// The dark that shows hot photosites best, of darks of one temperature: the longest in which no more of them are full than in all. None
@@ -69,7 +86,7 @@ pub fn hot_tail(
     let share = count as f64 / all * (threshold / excess).exp();
     let is_told = count > 0 && threshold < REACH * excess && share < 0.5;
     let others = (spread * spread - blur.noise * blur.noise).max(0.0);
-    is_told.then(|| HotTail { exposure_s, share, excess_per_s: excess / exposure_s, count, others })
+    is_told.then(|| HotTail { exposure_s, share, excess_per_s: excess / exposure_s, count, others, parted: None })
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -82,6 +99,13 @@ mod tests {
     use super::*;
     use crate::frame::to_sample;
     use crate::random::philox::philox4x32_10;
+
+    /// Variances 4 and 9 per second² make 4 + 9 t² at each time; of one time nothing is parted.
+    #[test]
+    fn patterns_of_two_times_are_parted() {
+        assert_eq!(parted([(0.5, 6.25), (2.0, 40.0)]), Some([4.0, 9.0]));
+        assert_eq!(parted([(2.0, 40.0), (2.0, 40.0)]), None);
+    }
 
     /// Of 40 000 photosites that differ by 2, 800 have an excess of mean 60: the share and the mean come back within 4 standard deviations,
     /// 1/√n of those that stand out, and so does what the others differ by. Of none nothing is told.

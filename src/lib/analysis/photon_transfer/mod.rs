@@ -32,7 +32,7 @@ pub use curve::{LEAST_VARIANCE, Values, full_mean};
 pub use dark::doubling_temperature;
 pub use findings::of_class;
 pub use fit::Line;
-pub use hot::{HotTail, dark_of_tail, hot_tail};
+pub use hot::{HotTail, dark_of_offset, dark_of_tail, hot_tail, parted};
 pub use level::{Condition, Level};
 pub use linearity::Linearity;
 pub use pattern::left_in_mean;

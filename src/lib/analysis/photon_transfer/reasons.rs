@@ -36,6 +36,8 @@ pub struct Reasons<'a> {
     pub darks: &'a [Level],
     /// Darks of all temperatures.
     pub all_darks: &'a [Level],
+    /// Whether darks of the flats' temperature are left out, as code 0 cuts them off.
+    pub is_left_out: bool,
 }
 
 impl Reasons<'_> {
@@ -69,7 +71,7 @@ impl Reasons<'_> {
     /// Why darks do not tell what goes by time.
     pub fn of_times(self) -> String {
         match self.darks {
-            [_, ..] if self.curve.are_darks_clipped => CLIPPED.into(),
+            [_, ..] if self.curve.are_darks_clipped || self.is_left_out => CLIPPED.into(),
             _ if self.curve.are_darks_cut_off() => CUT_OFF.into(),
             darks if darks.len() < self.all_darks.len() => {
                 "it takes darks at three exposure times or more, of the flats' temperature".into()

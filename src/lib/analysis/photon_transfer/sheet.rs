@@ -156,7 +156,7 @@ pub const KEYS: [(&str, &str, &str); 31] = [
     ("dark_current_e_per_s", "dark current, from means", "e-/s"),
     ("dark_current_from_variance_e_per_s", "dark current, from variances", "e-/s"),
     ("dark_current_doubling_k", "dark current doubles in", "K"),
-    ("dsnu_offset_e", "dark pattern that no time adds", "e-"),
+    ("dsnu_offset_e", "dark pattern of photosites that no time adds", "e-"),
     ("dcnu", "dark current non-uniformity", ""),
 ];
 

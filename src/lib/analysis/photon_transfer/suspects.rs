@@ -1,6 +1,6 @@
 //! Levels that stand far off what all others show: a flat among the darks, a dark among the flats, an exposure time that is wrong.
 
-use super::curve::{Curve, below_saturation};
+use super::curve::{Curve, below_saturation, is_clipped};
 use super::fit::{Line, Point, variance_besides};
 use super::level::Level;
 use super::scatter::Scatter;
@@ -21,8 +21,15 @@ pub struct Suspect {
     pub problem: String,
 }
 
-/// Flats and darks of a class that stand far off the others.
-pub fn suspects(curve: Option<&Curve>, flats: &[Level], darks: &[Level], scatter: &Scatter) -> Vec<Suspect> {
+/// Flats and darks of a class that stand far off the others; of darks that code 0 cuts off the means are no line over time, of codes whose
+/// error of rounding has such a variance.
+pub fn suspects(
+    curve: Option<&Curve>,
+    flats: &[Level],
+    darks: &[Level],
+    scatter: &Scatter,
+    rounding: f64,
+) -> Vec<Suspect> {
     let mut temperatures: Vec<Option<f64>> = Vec::new();
     for dark in darks {
         if !temperatures.contains(&dark.condition.temperature_k) {
@@ -32,7 +39,8 @@ pub fn suspects(curve: Option<&Curve>, flats: &[Level], darks: &[Level], scatter
     let mut found: Vec<Suspect> = Vec::new();
     for temperature in temperatures {
         let own = || darks.iter().filter(|dark| dark.condition.temperature_k == temperature);
-        found.extend(off_line(&own().collect::<Vec<_>>(), scatter));
+        let whole: Vec<&Level> = own().filter(|dark| !is_clipped(dark, rounding)).collect();
+        found.extend(off_line(&whole, scatter));
         let is_of_it = |flat: &&Level| flat.condition.temperature_k.is_none_or(|kelvin| Some(kelvin) == temperature);
         let flats = || flats.iter().filter(is_of_it);
         let alone = |dark| full(dark).or_else(|| above_a_flat(dark, flats(), scatter));

@@ -42,7 +42,7 @@ pub fn without_gain(
         stacks: [None; 2],
         notes: Vec::new(),
         doubts: Vec::new(),
-        suspects: suspects(None, flats, all_darks, scatter),
+        suspects: suspects(None, flats, all_darks, scatter, settings.rounding()),
         stuck: Vec::new(),
         early: Vec::new(),
         hot: None,

@@ -75,19 +75,39 @@ pub struct PatternView {
     pub outstanding: [f64; 2],
     /// Those that stand out most, the most first.
     pub outliers: Vec<Outlier>,
-    /// Variances that columns and rows add as the filter shows them, without what varies smoothly, and what they scatter by, standard
-    /// deviations.
+    /// Variances that columns and rows add as the filter shows them, without what varies smoothly and photosites that stand out, and what
+    /// they scatter by, standard deviations.
     pub lines: [[f64; 2]; 2],
+    /// The variance that single photosites add besides, without those that stand out and noise that is left in the means, and what it
+    /// scatters by, a standard deviation.
+    pub rest: [f64; 2],
 }
 
 /// What the filter leaves of the variance of single photosites, 1 − 1/25, and of that of whole rows or columns, 1 − 1/5, as of
 /// their means.
 const LEFT: [f64; 2] = [0.96, 0.8];
 
-/// The variance between columns or rows that means of `count` photosites behind the filter tell, and what it scatters by.
-fn of_lines(means: &[[f64; 2]], count: f64, spread: f64) -> [f64; 2] {
-    let all = means.iter().map(|[_, mean]| mean * mean).sum::<f64>() / means.len() as f64 / LEFT[1];
-    [all - spread * spread / LEFT[0] / count, all * (2.0 / means.len() as f64).sqrt()]
+/// The variance between columns or rows that means of `count` photosites of such a mean square behind the filter tell, and what it
+/// scatters by.
+fn of_lines(means: &[f64], count: f64, square: f64) -> [f64; 2] {
+    let all = means.iter().map(|mean| mean * mean).sum::<f64>() / means.len() as f64 / LEFT[1];
+    [all - square / LEFT[0] / count, all * (2.0 / means.len() as f64).sqrt()]
+}
+
+/// What columns and rows add, and what single photosites add besides noise that is left of such a standard deviation: variances of grids
+/// behind the filter, each with what it scatters by.
+fn parts_of(filtered: &[Grid], noise: f64) -> ([[f64; 2]; 2], [f64; 2]) {
+    let values = || filtered.iter().flat_map(|grid| &grid.values);
+    let count = values().count() as f64;
+    let square = values().map(|value| value * value).sum::<f64>() / count;
+    let lines = [0, 1].map(|axis| {
+        let means: Vec<f64> = filtered.iter().flat_map(|grid| grid.profile(axis)).collect();
+        let extent = [filtered[0].columns, filtered[0].rows][axis] as f64;
+        of_lines(&means, filtered[0].values.len() as f64 / extent, square)
+    });
+    let in_lines = lines.iter().map(|[variance, _]| variance.max(0.0)).sum::<f64>() * LEFT[1];
+    let scatter = (2.0 / count).sqrt() * (square / LEFT[0]).hypot(noise * noise);
+    (lines, [(square - in_lines) / LEFT[0] - noise * noise, scatter])
 }
 
 /// A grid of values.
@@ -155,14 +175,40 @@ impl Grid {
         Self { columns, rows, values }
     }
 
-    /// A value less the mean of the box around it, without others that are told of.
+    /// A value less the mean of the box around it, as far as there is one, without others that are told of.
     fn above_others(&self, [x, y]: [usize; 2], told: &[bool]) -> f64 {
         let margin = BOX / 2;
-        let rows = y - margin..=y + margin;
-        let around = rows.flat_map(|y| (x - margin..=x + margin).map(move |x| y * self.columns + x));
+        let reach = |at: usize, extent: usize| at.saturating_sub(margin)..=(at + margin).min(extent - 1);
+        let (columns, rows) = (reach(x, self.columns), reach(y, self.rows));
+        let around = rows.flat_map(|y| columns.clone().map(move |x| y * self.columns + x));
         let others = around.filter(|at| !told[*at]);
         let (sum, count) = others.fold((0.0, 0.0), |(sum, count), at| (sum + self.values[at], count + 1.0));
-        self.values[y * self.columns + x] - sum / count
+        self.values[y * self.columns + x] - if count > 0.0 { sum / count } else { self.mean() }
+    }
+
+    /// Whether a place is so near the edge that there is no box around it.
+    fn is_at_edge(&self, [x, y]: [usize; 2]) -> bool {
+        let margin = BOX / 2;
+        x.min(y) < margin || x + margin >= self.columns || y + margin >= self.rows
+    }
+
+    /// The same with means of those around in place of photosites that stand out, as `told` has those behind the filter: at the edge
+    /// those count too that are so far off.
+    fn mended(&self, told: &[bool], far: f64) -> Self {
+        let mut told = if told.is_empty() { vec![false; self.values.len()] } else { told.to_vec() };
+        let place = |at: usize| [at % self.columns, at / self.columns];
+        let at_edge = (0..self.values.len()).filter(|at| self.is_at_edge(place(*at)));
+        let above = at_edge.map(|at| (at, self.above_others(place(at), &told).abs()));
+        let mut off: Vec<(usize, f64)> = above.filter(|(_, above)| *above > far).collect();
+        off.sort_by(|a, b| b.1.total_cmp(&a.1));
+        for (at, _) in off {
+            told[at] = self.above_others(place(at), &told).abs() > far;
+        }
+        let values = self.values.iter().enumerate();
+        let stand_in = |(at, value): (usize, &f64)| {
+            if told[at] { value - self.above_others(place(at), &told) } else { *value }
+        };
+        Self { columns: self.columns, rows: self.rows, values: values.map(stand_in).collect() }
     }
 
     /// Means of the columns, or of the rows.
@@ -211,31 +257,29 @@ pub fn pattern_view(
     let least = if blur.hidden > 0.0 { LEFT[0].sqrt() * blur.noise } else { 0.0 };
     let spread = (median(&mut absolute) / NORMAL_MEDIAN).max(least);
     let far = OUTSTANDING * spread + 2.0 * blur.hidden;
-    let (outstanding, outliers) = outliers(sites, [&grids, &filtered], middle, [spread, far]);
-    let lines = [0, 1].map(|axis| {
-        of_lines(
-            &profiles[axis],
-            filtered[0].values.len() as f64 / [filtered[0].columns, filtered[0].rows][axis] as f64,
-            spread,
-        )
-    });
+    let (outstanding, outliers, told) = outliers(sites, [&grids, &filtered], middle, [spread, far]);
+    // A hot photosite would be a part of its column and of its row, and of all around it behind the filter.
+    let mended = |(grid, told): (&Grid, &Vec<bool>)| grid.mended(told, if spread > 0.0 { far } else { f64::INFINITY });
+    let mended: Vec<Grid> = grids.iter().zip(&told).map(|of| mended(of).high_passed()).collect();
+    let (lines, rest) = parts_of(&mended, blur.noise);
     let figure = draws.then(|| {
         let (histogram, normal) = histogram(&values, middle, spread);
         let (accumulated, normal_accumulated) = accumulated(absolute, spread);
         PatternFigure { spectra: spectra(&grids), histogram, normal, accumulated, normal_accumulated }
     });
-    Some(PatternView { profiles, figure, spread, outstanding, outliers, lines })
+    Some(PatternView { profiles, figure, spread, outstanding, outliers, lines, rest })
 }
 
-/// How many photosites stand out, and how many of a normal law would; and those that do most. One that stands out is left out of the
-/// means around its neighbors, which would stand out to the other side by a 25th of it.
+/// How many photosites stand out, and how many of a normal law would; those that do most; and which of each grid, nothing of one of
+/// which none may. One that stands out is left out of the means around its neighbors, which would stand out to the other side by a 25th
+/// of it.
 fn outliers(
     sites: &[&Site],
     [grids, filtered]: [&[Grid]; 2],
     middle: f64,
     [spread, far]: [f64; 2],
-) -> ([f64; 2], Vec<Outlier>) {
-    let mut outliers = Vec::new();
+) -> ([f64; 2], Vec<Outlier>, Vec<Vec<bool>>) {
+    let (mut outliers, mut all_told) = (Vec::new(), Vec::new());
     let is_far = |value: f64| (value - middle).abs() > far && spread > 0.0;
     for ((site, grid), filtered) in sites.iter().zip(grids).zip(filtered) {
         let mut far: Vec<(usize, f64)> =
@@ -251,13 +295,14 @@ fn outliers(
                 outliers.push(Outlier { x: place(0, x), y: place(1, y), deviation });
             }
         }
+        all_told.push(told);
     }
     let count: usize = filtered.iter().map(|grid| grid.values.len()).sum();
     let expected = crate::numerics::significance::of_normal(OUTSTANDING) * count as f64;
     let outstanding = [outliers.len() as f64, expected];
     outliers.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
     outliers.truncate(NAMED);
-    (outstanding, outliers)
+    (outstanding, outliers, all_told)
 }
 
 /// Spectrograms along rows and along columns, the mean of those of the grids.
@@ -350,6 +395,25 @@ mod tests {
         let places: Vec<[usize; 2]> = view.outliers.iter().map(|outlier| [outlier.x, outlier.y]).collect();
         assert_eq!((places, view.outstanding[0]), (vec![[20, 20], [22, 20]], 2.0));
         assert!((view.outliers[1].deviation + 20.0 * 23.0 / 24.0).abs() < 1.0, "{:?}", view.outliers[1]);
+    }
+
+    /// Of noise of variance 1/12 alone twelve photosites that stand out by thousands of spreads, one of them at the edge, make no rows and
+    /// columns beyond what means of 56 vary by, 5 standard deviations of √(2/56) of that, and leave single photosites their variance, within 5 of
+    /// what it scatters by.
+    #[test]
+    fn what_stands_out_is_no_part_of_rows_and_columns() {
+        const SIDE: usize = 60;
+        let site = Site { class: "Y".into(), plane: 0, first: [0, 0], step: [1, 1], size: [SIDE, SIDE] };
+        let at = |index: usize| {
+            let [word, ..] = philox4x32_10([u32::try_from(index).unwrap(), 0, 0, 0], [1, 4]);
+            let hot = if index % 311 == 1 { 3000.0 } else { 0.0 };
+            f64::from(word) / 4_294_967_296.0 + hot
+        };
+        let view = pattern_view(&[&site], [SIDE, 1], &at, Blur::default(), false).unwrap();
+        let of_means = 1.0 / 12.0 / 56.0;
+        assert!(view.lines.iter().all(|[variance, _]| variance.abs() < of_means), "{:?}", view.lines);
+        let [variance, scatter] = view.rest;
+        assert!((variance - 1.0 / 12.0).abs() < 5.0 * scatter && scatter < 0.01, "{:?}", view.rest);
     }
 
     /// Of means that are mostly one code, and of every twentieth photosite between it and the next, one that is 5 codes off stands out.

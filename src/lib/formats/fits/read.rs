@@ -248,6 +248,9 @@ fn geometry(name: &str, axes: &[u64]) -> Result<Geometry> {
 const HALF_OF_64_BITS: f64 = 9_223_372_036_854_775_808.0;
 const SIGN_OF_64_BITS: u64 = 1 << 63;
 
+/// What no integers of 16 bits with sign are below: differences of frames may be negative, but not by so much.
+const LEAST_WITH_SIGN: f32 = -16_384.0;
+
 impl Form {
     /// Reads the keywords of samples.
     fn of(header: &Header, bitpix: i64) -> Self {
@@ -329,6 +332,14 @@ impl Form {
         if overflows { Err(Overflow) } else { Ok(()) }
     }
 
+    /// The first of samples that tells that codes of 16 bits were stored as integers with sign, in which those above 32767 are negative.
+    fn wrapped(&self, samples: &[f32]) -> Option<f32> {
+        if self.stored != SampleType::I16 || !self.is_plain() {
+            return None;
+        }
+        samples.iter().copied().find(|sample| *sample < LEAST_WITH_SIGN)
+    }
+
     /// Whether values are the stored ones, of which NaN and infinities stay what they are.
     fn is_plain(&self) -> bool {
         (self.scale, self.zero) == (1.0, 0.0)
@@ -371,9 +382,17 @@ impl SampleReader for FitsReader {
         for row in self.next_row..self.next_row + rows {
             for channel in 0..self.geometry.channels.len() {
                 self.fetch(row, channel)?;
+                let start = samples.len();
                 self.form.append(&self.stored, samples).map_err(|Overflow| {
                     Error::format(&self.name, "it has samples beyond 3.4e38, the largest of single precision")
                 })?;
+                if let Some(sample) = self.form.wrapped(&samples[start..]) {
+                    let problem = format!(
+                        "it has a sample of {sample}, as codes above 32767 have that were stored as 16 bits with sign (BITPIX = 16 without \
+                         BZERO); write them without sign, which in FITS is BZERO = 32768"
+                    );
+                    return Err(Error::format(&self.name, problem));
+                }
             }
         }
         self.next_row += rows;

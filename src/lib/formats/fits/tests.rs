@@ -159,6 +159,21 @@ fn values_are_those_of_the_standard() {
     assert_eq!((reader.stored_as(), samples), (Some(SampleType::U64), vec![1757.0, 65_535.0]));
 }
 
+/// Codes of 35 216 as 16 bits with sign are -30 320; with a BZERO, and BLANK, they are what they say.
+#[test]
+fn codes_without_sign_are_not_stored_with_one() {
+    let of = |more: &[(&str, &str)], sample: i16| part(("SIMPLE", "T"), &["3", "2"], more, &[1, 2, 3, sample, 5, 6]);
+    for cards in [Vec::new(), vec![("BZERO", "0.0")]] {
+        let said = complaint(&of(&cards, -30_320));
+        assert!(said.starts_with("in.fits: it has a sample of -30320, as codes above 32767 have"), "{said}");
+        assert!(said.ends_with("write them without sign, which in FITS is BZERO = 32768"), "{said}");
+        assert_eq!(both(&of(&cards, -16_384)).unwrap().1[3], -16_384.0);
+    }
+    assert_eq!(both(&of(&[("BZERO", "32768")], -30_320)).unwrap().1[3], 2448.0);
+    assert_eq!(both(&of(&[("BZERO", "1")], -30_320)).unwrap().1[3], -30_319.0);
+    assert!(both(&of(&[("BLANK", "-32768")], i16::MIN)).unwrap().1[3].is_nan());
+}
+
 #[test]
 fn parts_are_chosen() {
     let empty = || part(("SIMPLE", "T"), &[], &[], &[]);

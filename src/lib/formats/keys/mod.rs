@@ -171,6 +171,7 @@ mod tests {
             ],
             KeyPage::Matrix => vec![
                 ("", field_names::<CameraMatrix>()),
+                ("camera_settings.", field_names::<CameraSettings>()),
                 ("response.", field_names::<ResponseFiles>()),
                 ("response.quantum_efficiency.", field_names::<CurveFile>()),
                 ("response.relative_response.", field_names::<CurveFile>()),

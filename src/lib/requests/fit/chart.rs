@@ -102,6 +102,8 @@ struct Seen {
     /// Patches that do not count, and why.
     left_out: Vec<(usize, String)>,
     frame: Option<FrameHeader>,
+    /// White level less black level, where means are not shares of it already.
+    range_adu: Option<f64>,
     notes: Vec<Note>,
     /// Patches that scatter by more than their noise.
     uneven: Vec<usize>,
@@ -246,6 +248,7 @@ impl ChartFit {
             covariances: table.covariances.iter().map(|covariance| covariance / (range * range)).collect(),
             names: table.names,
             frame: None,
+            range_adu: self.levels.map(|_| range),
             notes: Vec::new(),
             uneven: Vec::new(),
         })
@@ -316,10 +319,10 @@ impl ChartFit {
         let of_white = inverse.map(|inverse| inverse * Vector3::from(expected.white));
         let saturation_y = of_white.map(|signal| signal.max().recip()).filter(|y| *y > 0.0 && y.is_finite());
         let unit = if self.luminance.is_some() { MATRIX_UNIT } else { RELATIVE_MATRIX_UNIT };
+        let frame = seen.frame.as_ref().map(|frame| &frame.metadata);
         Ok(CameraMatrix {
             method: Some(format!("chart, total least squares; XYZ in the light {}", expected.light)),
-            sensor: seen.frame.as_ref().and_then(|frame| frame.metadata.camera_names().next().map(str::to_owned)),
-            adu_per_e: self.luminance.and_then(|_| seen.frame.as_ref()?.metadata.adu_per_e()),
+            sensor: frame.and_then(|frame| frame.camera_names().next().map(str::to_owned)),
             white_xy: Some(chromaticity(expected.white)),
             condition: Some(found.condition),
             rank: Some(3),
@@ -349,7 +352,7 @@ impl ChartFit {
                 degrees: found.degrees,
                 saturation_y,
             }),
-            ..CameraMatrix::bare(unit, xyz_from_camera)
+            ..CameraMatrix::of_codes(unit, xyz_from_camera, frame, seen.range_adu)
         })
     }
 
@@ -384,6 +387,7 @@ fn see_frame(mut reader: FrameReader, corners: [[f64; 2]; 4]) -> Result<(Seen, V
         let grid = Grid::new(corners).map_err(|problem| Error::Usage(format!("--corners: {problem}")))?;
         charts.push((corners, ChartReader::new(&frame, grid)?));
     }
+    let range_adu = charts.first().map(|(_, chart)| chart.range_adu());
     let height = frame.geometry.height;
     let step = frame.geometry.band_rows(frame.geometry.step_rows(reader.natural_rows()), 1);
     let (mut rows, mut done) = (Vec::new(), 0);
@@ -402,7 +406,7 @@ fn see_frame(mut reader: FrameReader, corners: [[f64; 2]; 4]) -> Result<(Seen, V
     let mut notes = super::super::notes::of_reader(&reader);
     let least = read.iter().flat_map(|patch| patch.count).min().unwrap_or(0);
     notes.push(Note::Remark(format!("{}: {least} photosites or more of each class in a patch", frame.name)));
-    Ok((seen_in(&frame, &read, notes), turned))
+    Ok((Seen { range_adu, ..seen_in(&frame, &read, notes) }, turned))
 }
 
 /// What was read of the patches of a chart in a frame.
@@ -419,6 +423,7 @@ fn seen_in(frame: &FrameHeader, read: &[ReadPatch], notes: Vec<Note>) -> Seen {
             .map(|patch: &ReadPatch| Matrix3::from_diagonal(&Vector3::from(patch.variance)))
             .collect(),
         frame: Some(frame.clone()),
+        range_adu: None,
         notes,
     }
 }

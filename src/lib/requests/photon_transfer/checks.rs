@@ -138,8 +138,11 @@ pub fn check_array(head: &FrameHeader, groups: &[Group], surveys: &[Survey]) -> 
     Ok(())
 }
 
-/// What codes look like that is not said of them: shifted, or ending below the code that is said to be the largest.
-pub fn doubt_of_codes(list: &str, head: &FrameHeader, groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
+/// The temporal variance of darks in codes² of which photosites that are full spread over several codes.
+const LEAST_OF_END: f64 = 1.0;
+
+/// What codes look like that is not said of them: shifted, or ending at `largest`, below the code that is said to be that.
+pub fn doubt_of_codes(list: &str, head: &FrameHeader, surveys: &[Survey], largest: Option<f64>) -> Vec<Note> {
     let shift = surveys.iter().fold(0, |bits, survey| bits | survey.bits).trailing_zeros();
     let shifted = (shift > 0 && shift < u32::BITS).then(|| {
         format!(
@@ -149,13 +152,42 @@ pub fn doubt_of_codes(list: &str, head: &FrameHeader, groups: &[Group], surveys:
         )
     });
     let top = head.metadata.white_level_adu.map(|white| white.largest());
-    let lit = groups.iter().zip(surveys).filter(|(group, _)| group.condition.is_lit);
-    let brightest = lit.flat_map(|(_, survey)| &survey.sites).map(|site| site.mean).fold(0.0, f64::max);
-    let end = (1..16).map(|bits| f64::from(bits).exp2() - 1.0).find(|end| (end - brightest).abs() < 0.01);
-    let ended = end.zip(top).filter(|(end, top)| end < top).map(|(end, top)| {
+    let ended = largest.zip(top).filter(|(end, top)| end < top).map(|(end, top)| {
         format!("{list}: the brightest flats are of the code {end} alone; that is the largest then, and not {top}, which is said to be")
     });
     shifted.into_iter().chain(ended).map(Note::Warning).collect()
+}
+
+/// The code that the brightest flats are alone, without any scatter, below the code that is said to be the largest: codes end there, as noise
+/// of the read-out would spread those of photosites that are full; or as codes of 1 to 15 bits do.
+pub fn end_below(said: f64, groups: &[Group], surveys: &[Survey]) -> Option<f64> {
+    /// What a mean may be off a code, and the most variance of samples that are one code but for few.
+    const NEXT_TO_NONE: f64 = 0.01;
+    let lit = groups.iter().zip(surveys).filter(|(group, _)| group.condition.is_lit);
+    let sites = lit.flat_map(|(_, survey)| &survey.sites);
+    let brightest = sites.max_by(|a, b| a.mean.total_cmp(&b.mean))?;
+    let end = brightest.mean.round();
+    let scatter = brightest.variance.max(brightest.spatial.rest.value);
+    let is_one_code = (0.0..NEXT_TO_NONE).contains(&(end - brightest.mean)) && scatter < NEXT_TO_NONE;
+    let is_full_scale = (1..16).any(|bits| f64::from(bits).exp2() - 1.0 == end);
+    let is_end = is_full_scale || noise_of_darks(groups, surveys) >= LEAST_OF_END;
+    (is_one_code && is_end && end > 0.0 && end < said).then_some(end)
+}
+
+/// The temporal variance of darks at no time, by the shortest and the longest, in codes²: of the sites that have most.
+fn noise_of_darks(groups: &[Group], surveys: &[Survey]) -> f64 {
+    let noise = |survey: &Survey| survey.sites.iter().map(|site| site.variance).fold(0.0, f64::max);
+    let darks = groups.iter().zip(surveys).filter(|(group, _)| !group.condition.is_lit);
+    let mut of_times: Vec<[f64; 2]> =
+        darks.map(|(group, survey)| [group.condition.exposure_s.unwrap_or(0.0), noise(survey)]).collect();
+    of_times.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let least = of_times.iter().map(|[_, variance]| *variance).reduce(f64::min).unwrap_or(0.0);
+    match of_times[..] {
+        [[short_s, short], .., [long_s, long]] if long_s > short_s => {
+            least.min(short - short_s * (long - short) / (long_s - short_s))
+        }
+        _ => least,
+    }
 }
 
 /// The largest code by the brightest flats, of which most samples are one code that none is above, where noise of the read-out would spread
@@ -165,19 +197,7 @@ pub fn end_of_codes(groups: &[Group], surveys: &mut [Survey]) -> Option<f64> {
     /// Most samples.
     const MOST: f64 = 0.5;
     let is_lit = |place: &usize| groups[*place].condition.is_lit;
-    let noise = |survey: &Survey| survey.sites.iter().map(|site| site.variance).fold(0.0, f64::max);
-    let darks = (0..groups.len()).filter(|place| !is_lit(place));
-    let mut of_times: Vec<[f64; 2]> =
-        darks.map(|place| [groups[place].condition.exposure_s.unwrap_or(0.0), noise(&surveys[place])]).collect();
-    of_times.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let least = of_times.iter().map(|[_, variance]| *variance).reduce(f64::min).unwrap_or(0.0);
-    // That of no time, by the shortest and the longest.
-    let dark_noise = match of_times[..] {
-        [[short_s, short], .., [long_s, long]] if long_s > short_s => {
-            least.min(short - short_s * (long - short) / (long_s - short_s))
-        }
-        _ => least,
-    };
+    let dark_noise = noise_of_darks(groups, surveys);
     let lit = || (0..groups.len()).filter(is_lit).flat_map(|place| &surveys[place].sites);
     let largest = lit().filter_map(|site| site.largest).map(|(largest, _)| largest).fold(f64::NEG_INFINITY, f64::max);
     let is_most = |site: &SiteSurvey| {
@@ -357,6 +377,39 @@ mod tests {
         assert!(told.len() == 1 && told[0].contains(" and b are taken to be darks of one exposure"), "{told:?}");
         let told = of([100.0, 100.0, 100.0], [200.0, 200.0, 100.0]);
         assert!(told.len() == 1 && told[0].starts_with("c and ") && told[0].contains("flats of one light"), "{told:?}");
+    }
+
+    /// Flats of one code alone below that which is said to be the largest are the end of codes, where darks are noisy or codes of 8 bits end
+    /// there; not where they scatter, nor where that is the largest.
+    #[test]
+    fn codes_that_end_below_what_is_said_end_there() {
+        const SIDE: usize = 16;
+        let noise = |place: usize, frame: usize| ((place * 7919 + frame * 104_729 + place * frame * 31) % 9) as f32;
+        let of = |level: f32, scale: f32, end: f32| -> Survey {
+            let frame = |frame: usize| {
+                let geometry = Geometry::new(SIDE, SIDE, &["Y"]);
+                let header = FrameHeader { name: "a".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+                let sample = |place: usize| (level + scale * noise(place, frame)).min(end);
+                MemoryFrame::new(header, (0..SIDE * SIDE).map(sample).collect())
+            };
+            survey(&mut [frame(1), frame(2)], Some(4095.0), false).unwrap()
+        };
+        let group = |is_lit: bool| Group {
+            condition: Condition { is_lit, ..Condition::default() },
+            level: String::new(),
+            files: Vec::new(),
+        };
+        let groups = [group(false), group(true), group(true)];
+        let end = |dark_scale: f32, end: f32, said: f64| {
+            let surveys = [of(10.0, dark_scale, end), of(100.0, 1.0, end), of(5000.0, 1.0, end)];
+            end_below(said, &groups, &surveys)
+        };
+        assert_eq!(end(1.0, 3900.0, 4095.0), Some(3900.0));
+        assert_eq!(end(1.0, 3900.0, 3900.0), None);
+        assert_eq!(end(0.0, 3900.0, 4095.0), None);
+        assert_eq!(end(0.0, 255.0, 4095.0), Some(255.0));
+        let noisy = [of(10.0, 1.0, 4095.0), of(100.0, 1.0, 4095.0), of(3900.0, 1.0, 4095.0)];
+        assert_eq!(end_below(4095.0, &groups, &noisy), None);
     }
 
     /// Flats that pile up at one code, while darks are noisy, end the codes there, and samples at it count as clipped; flats of full

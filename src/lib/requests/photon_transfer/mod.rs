@@ -63,6 +63,8 @@ pub struct MeasuredCamera {
     pub patterns: Vec<[Option<PatternView>; 2]>,
     /// Frames that counted, flats and darks.
     pub frames: [usize; 2],
+    /// The largest code, where it is known: as it is said, or as the brightest flats show it, where that is less.
+    pub largest: Option<f64>,
     /// The probability that an interval holds its number.
     pub confidence: f64,
     /// Temperature of the sensor in K, where it is known.
@@ -111,13 +113,13 @@ impl PhotonTransfer {
         }
         check_array(first, &groups, &taken.found)?;
         notes.extend(doubt_of_frames(&groups, &taken.found));
-        notes.extend(doubt_of_codes(&list_name, first, &groups, &taken.found));
         let settings =
             Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes, top: largest };
         let temperature_k = main_temperature(&groups);
         let mut classes = taken.measured(temperature_k, &settings)?;
         taken.find_hot(&mut classes, temperature_k, settings.rounding())?;
-        let surveys = taken.found;
+        let (surveys, largest) = (taken.found, taken.largest);
+        notes.extend(doubt_of_codes(&list_name, first, &surveys, largest));
         let rounding = settings.rounding();
         let patterns = classes.par_iter().map(|class| patterns(first, class, &surveys, rounding, draws)).collect();
         notes.extend(doubts_of_levels(&classes, &groups));
@@ -131,6 +133,7 @@ impl PhotonTransfer {
             classes,
             patterns,
             frames: [count(true), count(false)],
+            largest,
             confidence: self.confidence,
             temperature_k,
             notes,
@@ -229,7 +232,11 @@ fn patterns(
     };
     let [(of_flat, flat_blur), (of_dark, dark_blur)] = [0, 1].map(|stack| left(stack).unwrap_or_default());
     let without = |mut view: PatternView, left: [f64; 2]| {
-        view.lines.iter_mut().zip(left).for_each(|([variance, _], left)| *variance -= left);
+        for ([variance, _], left) in view.lines.iter_mut().zip(left) {
+            *variance -= left;
+            // It came off that of single photosites as a part of rows and columns, and as one of all noise.
+            view.rest[0] += left;
+        }
         view
     };
     let of_dark_alone = || {

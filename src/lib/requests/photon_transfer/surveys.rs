@@ -1,11 +1,11 @@
 //! What the frames of all conditions tell: flats first, which show where photosites are full, then darks; and again without photosites
 //! that are stuck, where there are some.
 
-use super::checks::{check_no_copies, check_same_light, end_of_codes};
+use super::checks::{check_no_copies, check_same_light, end_below, end_of_codes};
 use super::conditions::{Group, Reading};
 use crate::analysis::photon_transfer::{
-    Asked, Blur, ClassFindings, Condition, Level, Picture, Settings, Site, SiteSurvey, Stuck, Survey, dark_of_tail,
-    full_mean, hot_tail, of_class, survey_as,
+    Asked, Blur, ClassFindings, Condition, Level, Picture, Settings, Site, SiteSurvey, Stuck, Survey, dark_of_offset,
+    dark_of_tail, full_mean, hot_tail, of_class, parted, pattern_view, survey_as,
 };
 use crate::error::{Error, Result};
 use crate::formats::many::OneOfMany;
@@ -19,7 +19,7 @@ pub struct Surveys<'a> {
     groups: &'a [Group],
     read: &'a Reading,
     are_codes: bool,
-    /// The largest code: as it is said, or as the brightest flats show it.
+    /// The largest code: as it is said, or as the brightest flats show it, where that is less.
     pub largest: Option<f64>,
     /// Whether that is said.
     is_said: bool,
@@ -69,6 +69,13 @@ impl<'a> Surveys<'a> {
         self.found = found.into_iter().flatten().collect();
         if !self.is_said && self.are_codes {
             self.largest = end_of_codes(self.groups, &mut self.found);
+        }
+        // Codes that end below what is said to be their end: samples at the end are counted again.
+        if let Some(said) = self.largest.filter(|_| self.is_said && self.are_codes)
+            && let Some(end) = end_below(said, self.groups, &self.found)
+        {
+            self.largest = Some(end);
+            return self.read_all();
         }
         Ok(())
     }
@@ -203,6 +210,15 @@ impl<'a> Surveys<'a> {
             let own: Vec<&Site> = sites.iter().filter(|site| site.class == class.name).collect();
             let picture = self.found[dark.place].picture.as_deref();
             class.hot = picture.and_then(|picture| hot_tail(&own, size, picture, exposure_s, blur));
+            let Some((tail, short)) = class.hot.as_mut().zip(dark_of_offset(&darks, rounding)) else { continue };
+            self.keep_picture(short.place)?;
+            let of_most = |dark: &Level| {
+                let picture = self.found[dark.place].picture.as_deref().filter(|_| dark.frames >= 2)?;
+                let at = |index: usize| f64::from(picture[index]);
+                let view = pattern_view(&own, size, &at, Blur::of(dark, rounding), false)?;
+                Some((dark.condition.exposure_s?, view.rest[0]))
+            };
+            tail.parted = of_most(short).zip(of_most(dark)).and_then(|(short, long)| parted([short, long]));
         }
         Ok(())
     }
@@ -322,7 +338,9 @@ impl<'a> Surveys<'a> {
                 let by_light = if by_photons { light_a.total_cmp(&light_b) } else { std::cmp::Ordering::Equal };
                 by_light.then(mean_a.total_cmp(&mean_b))
             });
-            of_class(name, &flats, &darks, &levels(&|condition| !condition.is_lit), settings)
+            // That may be less than was said, once photosites that are stuck do not count.
+            let settings = Settings { top: self.largest, ..*settings };
+            of_class(name, &flats, &darks, &levels(&|condition| !condition.is_lit), &settings)
         };
         self.classes().par_iter().map(of).collect()
     }

@@ -20,12 +20,13 @@ use crate::chain::{CameraSetup, ChainPrediction, ChainStage, Predictor, Predicto
 use crate::color::Space;
 use crate::error::{Error, Result};
 use crate::formats::{data, spectral};
-use crate::metadata::Coverage;
+use crate::metadata::{AdcRecord, Coverage, Metadata};
 use crate::names::Named;
 use crate::propagation::Equations;
 use crate::spectrum::WavelengthGrid;
 use crate::stages::demosaic::Method;
 use crate::stages::to_xyz::ColorSettings;
+use crate::units::QuantityKind;
 use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -374,8 +375,7 @@ impl NoisePrediction {
             let text = format!("{} was fitted for the sensor {of_matrix}, not {}", path.display(), sensor.name);
             notes.push(Note::Warning(text));
         }
-        let adu_per_e = sensor.readout.as_ref().map(|readout| readout.adu_per_e);
-        let doubts = matrix.doubt_of_sensor(sensor).into_iter().chain(matrix.doubt_of_gain(adu_per_e));
+        let doubts = matrix.doubt_of_sensor(sensor).into_iter().chain(matrix.doubts_of_codes(&codes_of(sensor)));
         notes.extend(doubts.map(|doubt| Note::Warning(format!("{} {doubt}", path.display()))));
         notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
         Ok(Some(ColorSettings {
@@ -388,6 +388,18 @@ impl NoisePrediction {
             white_luminance: self.white.white_luminance,
         }))
     }
+}
+
+/// What the codes of a sensor are, for a matrix to judge: where they are not straight their range is another once they are.
+fn codes_of(sensor: &Sensor) -> Metadata {
+    let mut codes = Metadata::new(QuantityKind::Adu);
+    if let Some(readout) = &sensor.readout {
+        let adc = AdcRecord::of_readout(readout);
+        codes.adc = Some(adc);
+        codes.black_level_adu = Some(readout.bias_adu.into());
+        codes.white_level_adu = (!adc.is_bent()).then(|| f64::from(adc.top_code()).into());
+    }
+    codes
 }
 
 impl PredictedNoise {

@@ -124,12 +124,22 @@ fn other_codes(a: &Metadata, b: &Metadata) -> Option<(&'static str, &'static str
 
 /// What makes the dark signal of two frames differ.
 pub(super) fn differences(frame: &FrameHeader, dark: &FrameHeader) -> Vec<String> {
+    /// Coolers hold a temperature to this, in K; a dark signal changes by 2 %.
+    const NEAR_K: f64 = 0.2;
+    /// Times are told to such a share.
+    const NEAR_TIME: f64 = 1e-3;
+    /// What the sums of kelvins and degrees leave.
+    const ROUNDING: f64 = 1e-6;
+    let (times, temperatures) = (
+        dark.metadata.time_s().zip(frame.metadata.time_s()),
+        dark.metadata.temperature_k().zip(frame.metadata.temperature_k()),
+    );
     let pairs = [
-        ("exposure", "s", dark.metadata.time_s().zip(frame.metadata.time_s())),
-        ("temperature", "K", dark.metadata.temperature_k().zip(frame.metadata.temperature_k())),
+        ("exposure", "s", times.filter(|(a, b)| (a - b).abs() > (NEAR_TIME + ROUNDING) * b.abs())),
+        ("temperature", "K", temperatures.filter(|(a, b)| (a - b).abs() > NEAR_K + ROUNDING)),
     ];
-    let warn = |(what, unit, pair): (&str, &str, Option<(f64, f64)>)| {
-        let (its, theirs) = pair.filter(|(a, b)| !is_same(*a, *b))?;
+    let warn = |(what, unit, differing): (&str, &str, Option<(f64, f64)>)| {
+        let (its, theirs) = differing?;
         Some(format!(
             "{}: its {what} is {its} {unit}, but that of {} is {theirs} {unit}; their dark signals differ",
             dark.name, frame.name

@@ -4,7 +4,7 @@ use super::fitness::{Fitness, Misfit};
 use super::stack::{DarkSettings, DarkStack, Master};
 use crate::error::Result;
 use crate::frame::to_sample;
-use crate::metadata::FrameHeader;
+use crate::metadata::{FrameHeader, MasterKind};
 use crate::numerics::averages::Combine;
 use crate::numerics::vectors::{self, Kernel};
 use crate::stages::defects::{Survey, add};
@@ -114,6 +114,12 @@ impl<S: RowSource> DarkFrames<S> {
     /// A frame that counts as one with others whose mean is another than theirs, its mean, and the median of all.
     pub fn unlike(&self) -> Option<(&str, [f64; 2])> {
         self.masters.iter().find_map(Frames::unlike)
+    }
+
+    /// A dark frame that has more samples below zero so far than codes of a camera do, and their share.
+    pub fn below_zero(&self) -> Option<(&str, f64)> {
+        let darks = self.masters.iter().zip(&self.stack.masters);
+        darks.filter(|(_, master)| master.record.kind == MasterKind::Dark).find_map(|(frames, _)| frames.below_zero())
     }
 
     /// The mean of what is left of masked photosites of the frame so far, and its standard deviation, all of which may be that of whole rows;

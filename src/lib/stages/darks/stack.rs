@@ -277,7 +277,7 @@ impl DarkStack {
             Some((name, scene)) => Err(Error::format(
                 name,
                 format!(
-                    "its scene, {scene}, was lit; a dark frame is taken without light, as `render-radiance --dark` renders it"
+                    "its scene, `{scene}`, was lit; a dark frame is taken without light, as `render-radiance --dark` renders it"
                 ),
             )),
         }

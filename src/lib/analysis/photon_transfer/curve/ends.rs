@@ -1,6 +1,7 @@
 //! Samples at the ends of the codes, photosites that are full, and where flats saturate.
 
 use super::super::level::Level;
+use super::SAME_TIME;
 
 /// Below this temporal variance in codes² nothing is known of noise: without any, codes have as much half way between two of them.
 /// The standard's limit is 0.24 \[EMVA1288, Sec. 6.4].
@@ -75,6 +76,26 @@ pub fn is_clipped(dark: &Level, rounding: f64) -> bool {
     /// Of so few samples means and variances are those of all.
     const FEW: f64 = 1e-3;
     rounding > 0.0 && dark.at_ends[1] > FEW
+}
+
+/// Darks without those that code 0 cuts off, and whether the others stand for all: two times of them tell the dark signal beneath any flat, and
+/// one that of flats of its own. Where they do not, all.
+pub fn without_clipped(darks: &[Level], flats: &[Level], rounding: f64) -> (Vec<Level>, bool) {
+    let whole: Vec<Level> = darks.iter().filter(|dark| !is_clipped(dark, rounding)).cloned().collect();
+    if whole.len() == darks.len() {
+        return (whole, false);
+    }
+    let is_same = |a: Option<f64>, b: Option<f64>| match (a, b) {
+        (Some(a), Some(b)) => (a - b).abs() <= SAME_TIME * b.abs(),
+        (a, b) => a == b,
+    };
+    let timed = || whole.iter().zip(are_whole(&whole)).filter(|(_, is_whole)| *is_whole).map(|(dark, _)| dark);
+    let first = timed().find_map(|dark| dark.condition.exposure_s);
+    let time = |dark: &Level| dark.condition.exposure_s;
+    let are_several = timed().any(|dark| time(dark).is_some() && !is_same(time(dark), first));
+    let has_own = |flat: &Level| whole.iter().any(|dark| is_same(time(dark), time(flat)));
+    let is_told = !whole.is_empty() && (are_several || flats.iter().all(has_own));
+    if is_told { (whole, true) } else { (darks.to_vec(), false) }
 }
 
 /// Flats of light that is well below saturation, so that their means follow it, by their places.

@@ -16,7 +16,8 @@ mod weights;
 
 pub use bend::Bend;
 pub use ends::{
-    LEAST_VARIANCE, are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, stuck_shares, without_stuck,
+    LEAST_VARIANCE, are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, stuck_shares,
+    without_clipped, without_stuck,
 };
 
 use super::fit::{Line, Point};
@@ -63,7 +64,7 @@ pub struct Curve {
     pub is_offset_free: bool,
     /// Whether there are darks, and their temporal noise is so small that rounding hides it.
     pub is_silent: bool,
-    /// Whether the darks are clipped at 0.
+    /// Whether darks are clipped at 0, and too few others are there.
     pub are_darks_clipped: bool,
     /// The share of the light that signals miss their line by, beyond what they scatter by: a standard deviation.
     pub light_error: f64,
@@ -317,9 +318,13 @@ impl Curve {
     }
 
     /// What the variance of a flat goes by: its mean above no light; or, where the line ends in the variance of no light, its whole charge,
-    /// above no light and no time, where darks tell that: so that no shot noise of the dark charge stands at the end.
+    /// above no light and no time, where darks tell that: so that no shot noise of the dark charge stands at the end. Of darks that code 0 cuts
+    /// off nothing is known but that black is the same beneath all flats: it is the mean itself, which has the dark charge in it.
     pub fn charge_of_noise(&self, flat: usize) -> f64 {
-        let lines = self.dark_lines().filter(|_| self.is_offset_free && !self.are_darks_clipped);
+        if self.are_darks_clipped {
+            return self.flats[flat].mean.value;
+        }
+        let lines = self.dark_lines().filter(|_| self.is_offset_free);
         lines.map_or_else(|| self.signal(flat), |[mean, _]| self.flats[flat].mean.value - mean.offset)
     }
 
