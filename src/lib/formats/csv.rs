@@ -762,6 +762,14 @@ mod tests {
     }
 
     #[test]
+    fn factors_in_comments_are_told() {
+        let table =
+            SpectralTable::parse("t", b"# Units: W m-2 sr-1 nm-1 (x 1000)\nwavelength,L\n350,51\n600,12\n").unwrap();
+        let refused = table.radiance_unit(0, None).unwrap_err().to_string();
+        assert!(refused.contains("a radiance beside a factor"), "{refused}");
+    }
+
+    #[test]
     fn tables_that_are_something_else_are_told() {
         let complaint = |text: &str| SpectralTable::parse("t", text.as_bytes()).unwrap_err().to_string();
         let yaml = "schema: cyanometer-matrix/1\nunit: nits\nxyz_from_camera:\n- [1, 0, 0]\n";

@@ -16,8 +16,11 @@ impl Comments {
     pub(super) fn of(text: &str) -> Self {
         let mut found = Self::default();
         for line in delimited::comments(text).take(MAX_COMMENTS) {
-            found.units.extend(units_in(line));
-            found.other_quantity = found.other_quantity.or_else(|| other_quantity(line));
+            let other = other_quantity(line);
+            // A radiance beside a factor is none.
+            let is_scaled = matches!(&other, Some(Stated::Other { kind: OtherUnit::BesideFactor, .. }));
+            found.units.extend(units_in(line).into_iter().filter(|_| !is_scaled));
+            found.other_quantity = found.other_quantity.or(other);
             let counts = |clause: &&str| {
                 ["wavelength", "wavenumber", "photon energ"].iter().any(|word| clause.to_lowercase().contains(word))
             };
@@ -34,7 +37,8 @@ fn other_quantity(comment: &str) -> Option<Stated> {
     let (before, stated) = comment.split_once([':', '='])?;
     let mut words = before.split(|c: char| !c.is_alphanumeric());
     let states = words.any(|word| ["unit", "units"].contains(&word.to_lowercase().as_str()));
-    let is_no_radiance = |kind: OtherUnit| kind.conversion().is_some() || kind == OtherUnit::Relative;
+    let is_no_radiance =
+        |kind: OtherUnit| kind.conversion().is_some() || matches!(kind, OtherUnit::Relative | OtherUnit::BesideFactor);
     let is_other = |stated: &Stated| matches!(stated, Stated::Other { kind, .. } if is_no_radiance(*kind));
     states
         .then(|| unit_of_heading(stated).or_else(|| unit_of_heading(&format!("({})", stated.trim()))))?
