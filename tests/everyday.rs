@@ -69,7 +69,7 @@ fn marks_are_no_radiances() {
 /// The same light counted by wavelength, and by the energy of its photons per nm and per eV, of which 1 eV is λ²/1239.84 nm.
 #[test]
 fn energies_of_photons_are_the_wavelengths_that_they_have() {
-    const NM_EV: f64 = 1239.841_984;
+    const NM_EV: f64 = 1_239.841_984;
     let shop = Workshop::new();
     // Smooth, and so finely sampled that straight lines between are as good in all.
     let light = |nm: f64| 0.1 + 0.05 * (nm / 60.0).sin();

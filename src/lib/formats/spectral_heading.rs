@@ -16,9 +16,9 @@ pub(super) fn names_wavelengths(cell: &str) -> bool {
         || !matches!(WavelengthUnit::of_heading(cell), Ok(None))
 }
 
-/// Whether cells have two wavelengths with words about them.
+/// Whether cells have two wavelengths, with words about them or without.
 pub(super) fn holds_wavelengths<'a>(cells: impl Iterator<Item = &'a str>) -> bool {
-    cells.filter_map(|cell| Label::of(cell.trim())).nth(1).is_some()
+    cells.map(str::trim).filter_map(|cell| Label::of(cell).or_else(|| Label::bare(cell))).nth(1).is_some()
 }
 
 /// The wavelengths of a heading behind its first cell.

@@ -16,16 +16,20 @@ struct Column {
 
 /// The numbers of all columns of a table.
 #[derive(Debug, Default)]
-pub(super) struct Thousands(Vec<Column>);
+pub(super) struct Thousands {
+    columns: Vec<Column>,
+    /// Whether some comma can be that of decimals alone, so that all are.
+    has_decimal_commas: bool,
+}
 
 impl Thousands {
     /// Looks at a cell of a column that stands in such a line.
     pub(super) fn take(&mut self, column: usize, cell: &str, line: impl FnOnce() -> u64) {
-        if self.0.len() <= column {
-            self.0.resize(column + 1, Column::default());
+        if self.columns.len() <= column {
+            self.columns.resize(column + 1, Column::default());
         }
-        let known = &mut self.0[column];
-        if known.has_other {
+        let known = &mut self.columns[column];
+        if known.has_other && (self.has_decimal_commas || !cell.contains(',')) {
             return;
         }
         let unsigned = cell.strip_prefix(['+', '-']).unwrap_or(cell);
@@ -36,6 +40,7 @@ impl Thousands {
                     known.marked.get_or_insert_with(|| (cell.to_owned(), line()));
                 } else {
                     known.has_other = true;
+                    self.has_decimal_commas |= cell.contains(',');
                 }
             }
             None if are_digits(unsigned) && unsigned.len() == 3 => {
@@ -47,14 +52,14 @@ impl Thousands {
     }
 
     /// Refuses a column whose marks can be those of thousands: all of its numbers have three digits behind theirs, and those without one
-    /// have three, as 999 before 1,000; or the marks are commas in a table whose cells are not parted by semicolons, which people put
-    /// where commas are those of decimals.
+    /// have three, as 999 before 1,000; or the marks are commas, none of the table can be that of decimals alone, and cells are not parted by
+    /// semicolons, which people put where commas are those of decimals.
     ///
     /// # Errors
     ///
     /// [`Error::Format`] naming a number of such a column.
     pub(super) fn check(&self, name: &str, separator: char) -> Result<()> {
-        for (index, column) in self.0.iter().enumerate().filter(|(_, column)| !column.has_other) {
+        for (index, column) in self.columns.iter().enumerate().filter(|(_, column)| !column.has_other) {
             let Some((cell, line)) = &column.marked else { continue };
             let place = format!("line {line}, column {}", index + 1);
             let whole = cell.replace(['.', ','], "");
@@ -66,7 +71,7 @@ impl Thousands {
                 );
                 return Err(Error::format(name, problem));
             }
-            if cell.contains(',') && separator != ';' {
+            if cell.contains(',') && separator != ';' && !self.has_decimal_commas {
                 let problem = format!(
                     "{place}: nobody can tell whether the comma of `{cell}` is that of thousands or of decimals; write {whole} or {}, and so \
                      all numbers",
@@ -103,6 +108,7 @@ mod tests {
         for text in [
             "nm,L\n350,\"51,309\"\n600,\"12,3\"\n",
             "nm\tL\n350\t51,309\n600\t0,345\n",
+            "400,000 0,5\n410,000 1,25\n",
             "nm;L\n350;51,309\n600;12,345\n",
             "nm,L\n350,51.309\n600,12.345\n",
             "nm,L\n400,1.125\n500,2\n",
