@@ -100,7 +100,9 @@ fn respelled(value: &str, command: &Command, words: &[String]) -> Option<String>
             !matches!(wrong, Some(ContextValue::String(wrong)) if wrong == candidate || wrong == value)
         })
     };
-    candidates.into_iter().filter(|candidate| candidate != value).find(is_taken)
+    // What takes any word, as the name of a file, says nothing.
+    let takes_any = is_taken(&"\u{1}".to_owned());
+    candidates.into_iter().filter(|candidate| candidate != value).find(|candidate| !takes_any && is_taken(candidate))
 }
 
 /// Options as people guess them, and what they are here; it counts where the program has the option.

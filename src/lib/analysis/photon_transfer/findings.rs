@@ -1,9 +1,9 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
-use super::curve::{Curve, SAME_TIME, Values, below_saturation, stuck_shares, without_clipped, without_stuck};
+use super::curve::{Curve, Values, below_saturation, stuck_shares, without_clipped, without_stuck};
 use super::dark::{doubling_temperature, parted_pattern, pixel_noise};
 use super::doubts::doubts;
-use super::level::Level;
+use super::level::{Level, SAME_TIME};
 use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal, with_hidden};

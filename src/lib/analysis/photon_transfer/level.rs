@@ -3,6 +3,9 @@
 use super::rounding::{Hidden, Steps};
 use super::tally::SiteSurvey;
 
+/// Exposure times that differ by less are one.
+pub const SAME_TIME: f64 = 1e-6;
+
 /// A level of light, or darkness, as frames of it were taken.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Condition {

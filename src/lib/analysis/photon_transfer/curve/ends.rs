@@ -1,7 +1,6 @@
 //! Samples at the ends of the codes, photosites that are full, and where flats saturate.
 
-use super::super::level::Level;
-use super::SAME_TIME;
+use super::super::level::{Level, SAME_TIME};
 
 /// Below this temporal variance in codes² nothing is known of noise: without any, codes have as much half way between two of them.
 /// The standard's limit is 0.24 \[EMVA1288, Sec. 6.4].

@@ -21,7 +21,7 @@ pub use ends::{
 };
 
 use super::fit::{Line, Point};
-use super::level::Level;
+use super::level::{Level, SAME_TIME};
 use super::pattern::{Part, fixed};
 use super::scatter::{Component, Scatter};
 use super::settings::Settings;
@@ -33,9 +33,6 @@ use point::{Datum, Point4};
 const HIGHEST: f64 = 0.7;
 /// Patterns under light are measured to this share of saturation: few photosites see a tenth more than the mean.
 const HIGHEST_PATTERN: f64 = 0.9;
-/// Exposure times that differ by less are one.
-pub const SAME_TIME: f64 = 1e-6;
-
 /// Where the dark signal beneath a flat is known from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Beneath {
