@@ -282,7 +282,7 @@ mod tests {
             ),
             (
                 "name,sza,400,500,600,700\nz,50.7,1,2,3,4\ny,40,1,2,3,4\n",
-                "line 1, column 2: `sza` is no wavelength as the others are, such as `400`",
+                "line 1, column 2: `sza` is no wavelength, as the others are; leave the column out",
             ),
             ("400nm,500nm,600nm\n1,2,3\n4,5,6\n", "its rows are spectra without names"),
             ("id,site,400,500,600\n1,a,1,2,3\n", "line 1, column 2: `site` is no wavelength, as the others are"),
