@@ -6,7 +6,7 @@
 mod support;
 
 use std::fs;
-use support::fits::{chance, write_fits};
+use support::fits::{chance, write_fits, write_sensor};
 use support::workshop::{BAD_DATA, Workshop};
 
 const SIZE: [u32; 2] = [384, 32];
@@ -90,12 +90,7 @@ fn bias_frames_beside_a_black_level_with_dark_signal_are_not_doubted() {
 }
 
 fn sensor(shop: &Workshop, dark_current_e_per_s: f64) {
-    let readout = format!(
-        "width: {}, height: {}, cfa: rggb, full_well_e: 60000, dark_current_e_per_s: {dark_current_e_per_s}, temperature_k: 263, \
-         dcnu: 0.1, prnu: 0.01, read_noise_e: 3, bits: 16, bias_adu: 500, adu_per_e: 1",
-        SIZE[0], SIZE[1]
-    );
-    fs::write(shop.path("s.yaml"), format!("schema: cyanometer-sensor/2\nname: s\nreadout: {{{readout}}}\n")).unwrap();
+    write_sensor(shop, SIZE, dark_current_e_per_s, [0.1, 0.01, 3.0]);
 }
 
 #[test]

@@ -7,7 +7,7 @@ mod support;
 
 use cyanometer::frame::to_sample;
 use std::fs;
-use support::fits::{chance, write_fits};
+use support::fits::{chance, write_fits, write_sensor};
 use support::workshop::{BAD_DATA, Workshop};
 
 const SIZE: [u32; 2] = [384, 32];
@@ -29,13 +29,8 @@ fn write(shop: &Workshop, name: &str, [level, dark]: [f64; 2], seed: u64, cards:
     write_fits(shop, name, SIZE, &cards, |x, y| 500.0 + dark + level + scatter * chance(x, y, seed));
 }
 
-fn write_sensor(shop: &Workshop, dark_current_e_per_s: f64) {
-    let readout = format!(
-        "width: {}, height: {}, cfa: rggb, full_well_e: 60000, dark_current_e_per_s: {dark_current_e_per_s}, temperature_k: 263, \
-         dcnu: 0, prnu: 0, read_noise_e: 5, bits: 16, bias_adu: 500, adu_per_e: 1",
-        SIZE[0], SIZE[1]
-    );
-    fs::write(shop.path("s.yaml"), format!("schema: cyanometer-sensor/2\nname: s\nreadout: {{{readout}}}\n")).unwrap();
+fn sensor(shop: &Workshop, dark_current_e_per_s: f64) {
+    write_sensor(shop, SIZE, dark_current_e_per_s, [0.0, 0.0, 5.0]);
 }
 
 /// A description of the input holds for the frames beside that have none, but for what it says of an exposure; as options do, and as one
@@ -81,7 +76,7 @@ fn what_is_said_of_a_camera_counts_for_frames_beside() {
 #[test]
 fn dark_signals_are_scaled_above_the_bias_of_the_sensor_that_is_named() {
     let shop = Workshop::new();
-    write_sensor(&shop, 2.0);
+    sensor(&shop, 2.0);
     write(&shop, "light.fits", [300.0, 60.0], 1, &[("EXPTIME", "30.0")]);
     write(&shop, "dark.fits", [0.0, 120.0], 2, &[DARK, ("EXPTIME", "60.0")]);
     let line = "correct-frame light.fits --scale-dark --dark dark.fits -o out.exr";
@@ -97,7 +92,7 @@ fn dark_signals_are_scaled_above_the_bias_of_the_sensor_that_is_named() {
 #[test]
 fn darks_above_what_no_light_reads_are_told() {
     let shop = Workshop::new();
-    write_sensor(&shop, 0.1);
+    sensor(&shop, 0.1);
     let cards = [DARK, ("EXPTIME", "0.05")];
     write(&shop, "light.fits", [4000.0, 0.0], 1, &[("EXPTIME", "0.05")]);
     for seed in 2..6 {
@@ -171,7 +166,7 @@ fn dark_signals_that_the_sensor_predicts_are_not_doubted() {
         let told = shop.said(line, 0);
         assert!(told.contains(doubt), "{told}");
         for (current, is_told) in [(dark_current_e_per_s, false), (0.1 * dark_current_e_per_s, true)] {
-            write_sensor(&shop, current);
+            sensor(&shop, current);
             let told = shop.said(&format!("{line} --sensor s.yaml"), 0);
             assert_eq!(told.contains(doubt), is_told, "{dark}, {current}: {told}");
         }

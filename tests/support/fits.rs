@@ -40,3 +40,14 @@ pub fn chance(x: u32, y: u32, seed: u64) -> f64 {
     };
     next() - next()
 }
+
+/// Writes s.yaml, a sensor of 1 ADU per e⁻ over a bias of 500 ADU, of such a dark current at 263 K, and with such `dcnu`, `prnu` and read noise
+/// in e⁻.
+pub fn write_sensor(shop: &Workshop, size: [u32; 2], dark_current_e_per_s: f64, [dcnu, prnu, read_noise_e]: [f64; 3]) {
+    let readout = format!(
+        "width: {}, height: {}, cfa: rggb, full_well_e: 60000, dark_current_e_per_s: {dark_current_e_per_s}, temperature_k: 263, \
+         dcnu: {dcnu}, prnu: {prnu}, read_noise_e: {read_noise_e}, bits: 16, bias_adu: 500, adu_per_e: 1",
+        size[0], size[1]
+    );
+    fs::write(shop.path("s.yaml"), format!("schema: cyanometer-sensor/2\nname: s\nreadout: {{{readout}}}\n")).unwrap();
+}

@@ -156,6 +156,17 @@ fn tape7(name: &str, text: &str) -> Option<Error> {
     Some(Error::format(name, problem))
 }
 
+/// The words of a complaint that begins with the first and the last of some lines, from 1.
+fn lines_stand([first, last]: [usize; 2]) -> String {
+    if first == last { format!("line {first} stands") } else { format!("lines {first} to {last} stand") }
+}
+
+/// What is said of the lines from the first to the last above a heading, all from 1.
+fn above_heading([first, last, heading]: [usize; 3]) -> String {
+    let lines = lines_stand([first, last]);
+    format!("{lines} above the heading of its columns, line {heading}; put a # before what is no table")
+}
+
 /// A complaint of lines above a heading whose first column is that of wavelengths, where numbers follow that.
 fn above_named_columns(name: &str, text: &str) -> Option<Error> {
     /// So many lines are looked at, where none is longer than people read.
@@ -173,13 +184,8 @@ fn above_named_columns(name: &str, text: &str) -> Option<Error> {
     let (_, row) = lines.next()?;
     let are_alike = columns.split(MARKS).count() == row.split(MARKS).count() && numeric(&begin(row)).is_some();
     let last = text.lines().take(heading).enumerate().filter(|(_, line)| !line.trim().is_empty()).last()?.0;
-    let said = match last == first {
-        true => format!("line {} stands", first + 1),
-        false => format!("lines {} to {} stand", first + 1, last + 1),
-    };
-    let problem =
-        format!("{said} above the heading of its columns, line {}; put a # before what is no table", heading + 1);
-    (heading > first && are_alike).then(|| Error::format(name, problem))
+    let problem = || above_heading([first, last, heading].map(|index| index + 1));
+    (heading > first && are_alike).then(|| Error::format(name, problem()))
 }
 
 /// A complaint of lines that stand above the heading of a table, where there are any but one of units; or of one above numbers that is
@@ -222,15 +228,13 @@ fn preamble(name: &str, text: &str) -> Option<Error> {
     if (first..=last).any(is_heading) && !is_heading(heading) {
         return None;
     }
-    let lines = |last: usize| {
-        if first == last { format!("line {first} stands") } else { format!("lines {first} to {last} stand") }
-    };
     // `>>>>>Begin Spectral Data<<<<<` is no heading.
     let problem = match delimited::is_heading(text, heading) {
-        true => {
-            format!("{} above the heading of its columns, line {heading}; put a # before what is no table", lines(last))
+        true => above_heading([first, last, heading]),
+        false => {
+            let lines = lines_stand([first, heading]);
+            format!("{lines} above its numbers; put a # before what is no table, and behind them too")
         }
-        false => format!("{} above its numbers; put a # before what is no table, and behind them too", lines(heading)),
     };
     Some(Error::format(name, problem))
 }

@@ -48,8 +48,7 @@ pub(super) fn wavelengths(name: &str, line: u64, heading: &StringRecord, below: 
     };
     let is_alike = |label: &Option<Label>| label.as_ref().is_some_and(|label| label.is_alike(usual));
     let like: Vec<f64> = known.filter(|label| label.is_alike(usual)).map(|label| label.value).collect();
-    let goes_one_way = like.windows(2).all(|pair| pair[0] < pair[1]) || like.windows(2).all(|pair| pair[0] > pair[1]);
-    if like.len() < 2 || !goes_one_way || 3 * like.len() < 2 * (heading.len() - 1) {
+    if like.len() < 2 || !goes_one_way(&like) || 3 * like.len() < 2 * (heading.len() - 1) {
         return Ok(None);
     }
     let refuse = |problem: String| Err(Error::format(name, problem));
@@ -73,6 +72,11 @@ pub(super) fn wavelengths(name: &str, line: u64, heading: &StringRecord, below: 
     Ok(Some(Wavelengths { values: like, unit: usual.unit }))
 }
 
+/// Whether numbers rise throughout, or fall.
+fn goes_one_way(values: &[f64]) -> bool {
+    values.windows(2).all(|pair| pair[0] < pair[1]) || values.windows(2).all(|pair| pair[0] > pair[1])
+}
+
 /// Whether numbers behind a heading of wavelengths are names of columns, such as angles: these wavelengths stand below it, and they are not
 /// many that go one way through the light.
 fn are_names(corner: &str, values: &[f64], below: &str) -> bool {
@@ -86,9 +90,7 @@ fn are_names(corner: &str, values: &[f64], below: &str) -> bool {
     }
     let unit = WavelengthUnit::of_heading(corner).ok().flatten().unwrap_or(WavelengthUnit::Nanometer);
     let is_light = |value: f64| (LEAST_NM..=MOST_NM).contains(&unit.nm(value));
-    let goes_one_way =
-        values.windows(2).all(|pair| pair[0] < pair[1]) || values.windows(2).all(|pair| pair[0] > pair[1]);
-    let are_wavelengths = values.len() >= MANY && goes_one_way && values.iter().all(|value| is_light(*value));
+    let are_wavelengths = values.len() >= MANY && goes_one_way(values) && values.iter().all(|value| is_light(*value));
     numeric(below).is_some_and(is_light) && !are_wavelengths
 }
 
@@ -185,9 +187,7 @@ pub(super) fn refuse_index(name: &str, numbers: &Array2<f64>) -> Result<()> {
         return Ok(());
     }
     let second: Vec<f64> = numbers.columns().into_iter().nth(1).map(|column| column.to_vec()).unwrap_or_default();
-    let goes_one_way =
-        second.windows(2).all(|pair| pair[0] < pair[1]) || second.windows(2).all(|pair| pair[0] > pair[1]);
-    let advice = match goes_one_way && numbers.ncols() > 2 && second.iter().all(|nm| *nm >= SHORTEST_NM) {
+    let advice = match goes_one_way(&second) && numbers.ncols() > 2 && second.iter().all(|nm| *nm >= SHORTEST_NM) {
         true => {
             "its wavelengths seem to stand in the second: leave out the first, or head both, as in `No.,wavelength_nm` \
                  (a line behind a # is a comment)"

@@ -81,6 +81,14 @@ fn moments_of_rounding(x: f64, sigma: f64) -> [f64; 4] {
     found
 }
 
+/// Adds to moments the step of the powers from a code to the next, times the share that is beyond the edge between them.
+fn add_step(moments: &mut [f64; 4], code: f64, share: f64) {
+    let (below, above) = (powers(code), powers(code + 1.0));
+    for (moment, (below, above)) in moments.iter_mut().zip(below.into_iter().zip(above)) {
+        *moment += share * (above - below);
+    }
+}
+
 /// Moments 1 to 4, about a whole number from which the mean is off by `x`, of a rounded normal variable that no end is near; of a standard
 /// deviation of no less than [`FEW_TERMS`].
 fn free_moments(x: f64, sigma: f64) -> [f64; 4] {
@@ -210,12 +218,7 @@ impl Rounding {
     /// The moments of codes without ends, less what lies beyond these: fewer terms than a sum over the codes between them.
     fn less_beyond(&self, mean: f64, sigma: f64, center: f64) -> [f64; 4] {
         let mut moments = free_moments(mean - center, sigma);
-        self.each_beyond(mean, sigma, |code, share| {
-            let (below, above) = (powers(code - center), powers(code + 1.0 - center));
-            for (moment, (below, above)) in moments.iter_mut().zip(below.into_iter().zip(above)) {
-                *moment += share * (above - below);
-            }
-        });
+        self.each_beyond(mean, sigma, |code, share| add_step(&mut moments, code - center, share));
         moments
     }
 
@@ -224,12 +227,7 @@ impl Rounding {
         let reach = REACH * sigma;
         let base = self.code(mean);
         let mut moments = powers(base - center);
-        let mut add = |code: f64, share: f64| {
-            let (below, above) = (powers(code - center), powers(code + 1.0 - center));
-            for (moment, (below, above)) in moments.iter_mut().zip(below.into_iter().zip(above)) {
-                *moment += share * (above - below);
-            }
-        };
+        let mut add = |code: f64, share: f64| add_step(&mut moments, code - center, share);
         let mut code = base;
         while code < self.highest && code + 0.5 < mean + reach {
             add(code, cumulative((mean - code - 0.5) / sigma));

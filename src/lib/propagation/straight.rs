@@ -58,18 +58,19 @@ mod tests {
     use crate::numerics::gauss::panel;
     use crate::propagation::reading::codes_of;
 
+    const ADC: AdcRecord = AdcRecord {
+        bits: 12,
+        bias_adu: 100.0,
+        adu_per_e: 0.5,
+        linearization: None,
+        is_linearized: false,
+        white_adu: None,
+    };
+
     /// Against quadrature of the readings themselves, of electrons and of codes, on both sides.
     #[test]
     fn straight_readings_are_integrated() {
-        let adc = AdcRecord {
-            bits: 12,
-            bias_adu: 100.0,
-            adu_per_e: 0.5,
-            linearization: None,
-            is_linearized: false,
-            white_adu: None,
-        };
-        let readings = [Reading::electrons(7.0, 900.0), Reading::codes(adc, codes_of(&adc), 7.0, 900.0)];
+        let readings = [Reading::electrons(7.0, 900.0), Reading::codes(ADC, codes_of(&ADC), 7.0, 900.0)];
         let full = 1000.0;
         for reading in readings {
             for (mean, std, direction) in
@@ -98,16 +99,8 @@ mod tests {
 
     #[test]
     fn what_ends_or_shows_is_not_straight() {
-        let adc = AdcRecord {
-            bits: 12,
-            bias_adu: 100.0,
-            adu_per_e: 0.5,
-            linearization: None,
-            is_linearized: false,
-            white_adu: None,
-        };
         let of = |noise_e: f64, full: f64, end: f64| {
-            Straight::of(&Reading::codes(adc, codes_of(&adc), noise_e, 900.0), full, end).is_some()
+            Straight::of(&Reading::codes(ADC, codes_of(&ADC), noise_e, 900.0), full, end).is_some()
         };
         assert!(of(7.0, 1000.0, 1300.0));
         // Codes of two electrons show; the highest is that of 7990 electrons, the lowest of -200.

@@ -3,7 +3,7 @@
 use super::curve::{Curve, Values, below_saturation, stuck_shares, without_clipped, without_stuck};
 use super::dark::{doubling_temperature, parted_pattern, pixel_noise};
 use super::doubts::doubts;
-use super::level::{Level, SAME_TIME};
+use super::level::{Level, is_same_time};
 use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal, with_hidden};
@@ -163,7 +163,7 @@ pub fn of_class(
     let suspects = suspects(Some(&curve), flats, all_darks, &scatter, rounding);
     let mut doubts = doubts(&curve, flats, &suspects, confidence);
     if let [Some((_, lit)), Some((_, dark))] = stacks
-        && !is_same_time(lit, dark)
+        && !is_same_time(dark.condition.exposure_s, lit.condition.exposure_s)
         && let Some((flat_s, dark_s)) = lit.condition.exposure_s.zip(dark.condition.exposure_s)
     {
         doubts.push(format!(
@@ -232,14 +232,6 @@ fn widened(Interval { value, low, high }: Interval, variance: f64, confidence: f
     Interval { value, low: value - (value - low).hypot(other.low), high: value + (high - value).hypot(other.high) }
 }
 
-/// Whether exposure times of two levels are one, or neither is known.
-fn is_same_time(a: &Level, b: &Level) -> bool {
-    match (a.condition.exposure_s, b.condition.exposure_s) {
-        (Some(a), Some(b)) => (a - b).abs() <= SAME_TIME * a.abs(),
-        (a, b) => a == b,
-    }
-}
-
 /// The deviations from a straight line, against photons, or against time where light was constant.
 fn straightness(reasons: Reasons, scatter: &Scatter, confidence: f64) -> Result<Linearity, String> {
     let Reasons { curve, flats, .. } = reasons;
@@ -279,7 +271,9 @@ fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<
     let time = |level: &Level| level.condition.exposure_s.unwrap_or(0.0);
     let wanted = flat.map_or(0.0, |flat| time(&flats[flat]));
     let apart = |dark: &(usize, &Level)| (time(dark.1) - wanted).abs();
-    let of_time = |dark: &Level| flat.is_some_and(|flat| is_same_time(dark, &flats[flat]));
+    let of_time = |dark: &Level| {
+        flat.is_some_and(|flat| is_same_time(flats[flat].condition.exposure_s, dark.condition.exposure_s))
+    };
     let is_any = darks.iter().any(of_time);
     let most = darks.iter().filter(|dark| of_time(dark) == is_any).map(|dark| dark.frames).max();
     let dark = darks.iter().enumerate().filter(|(_, dark)| of_time(dark) == is_any && Some(dark.frames) == most);

@@ -7,10 +7,7 @@
 use super::curve::{are_whole, is_clipped};
 use super::level::Level;
 use super::sites::Site;
-use super::view::{Blur, OUTSTANDING};
-
-/// The median of absolute deviations of a normal law, in standard deviations.
-const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+use super::view::{Blur, NORMAL_MEDIAN, OUTSTANDING, median};
 
 /// Hot photosites of a class.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,10 +72,11 @@ pub fn hot_tail(
         };
         let own = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
         let own: Vec<f64> = own.map(|(x, y)| f64::from(picture[index(x, y)])).collect();
-        let middle = median(own.clone());
+        let middle = median(&mut own.clone());
         above.extend(own.iter().map(|value| value - middle));
     }
-    let spread = median(above.iter().map(|value| value.abs()).collect()) / NORMAL_MEDIAN;
+    let mut absolute: Vec<f64> = above.iter().map(|value| value.abs()).collect();
+    let spread = median(&mut absolute) / NORMAL_MEDIAN;
     let threshold = OUTSTANDING * spread.max(blur.noise) + 2.0 * blur.hidden;
     let beyond: Vec<f64> = above.iter().filter(|value| **value > threshold).map(|value| value - threshold).collect();
     let (count, all) = (beyond.len(), above.len() as f64);
@@ -87,11 +85,6 @@ pub fn hot_tail(
     let is_told = count > 0 && threshold < REACH * excess && share < 0.5;
     let others = (spread * spread - blur.noise * blur.noise).max(0.0);
     is_told.then(|| HotTail { exposure_s, share, excess_per_s: excess / exposure_s, count, others, parted: None })
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

@@ -6,6 +6,15 @@ use super::tally::SiteSurvey;
 /// Exposure times that differ by less are one.
 pub const SAME_TIME: f64 = 1e-6;
 
+/// Whether exposure times in s are one, or neither is known.
+pub fn is_same_time(time: Option<f64>, reference: Option<f64>) -> bool {
+    match (time, reference) {
+        (Some(time), Some(reference)) => (time - reference).abs() <= SAME_TIME * reference.abs(),
+        (None, None) => true,
+        _ => false,
+    }
+}
+
 /// A level of light, or darkness, as frames of it were taken.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Condition {

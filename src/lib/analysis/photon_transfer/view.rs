@@ -18,7 +18,7 @@ pub const OUTSTANDING: f64 = 5.0;
 /// So many of those that stand out most are named.
 pub const NAMED: usize = 100;
 /// The median of absolute deviations of a normal law, in standard deviations.
-const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+pub(super) const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
 /// What the mean of frames leaves uncertain of a photosite, in the unit of its pattern.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -343,7 +343,8 @@ fn mean_of(spectra: Vec<Vec<[f64; 2]>>) -> Vec<[f64; 2]> {
     (0..shortest).map(|index| [spectra[0][index][0], power(index)]).collect()
 }
 
-fn median(values: &mut [f64]) -> f64 {
+/// The median of numbers, which it puts into another order; of an even count the upper one.
+pub(super) fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -93,7 +93,7 @@ pub fn check_apart(heads: &[Head]) -> Result<Option<String>> {
         warning.get_or_insert_with(|| {
             format!(
                 "{}: its noise is drawn from the numbers of {}, of seed {seed} and frame {frame}: levels are not independent, and \
-                 intervals too narrow; draw each level with a --seed or --frames of its own",
+                 intervals too narrow; draw each level with another `add-noise --seed`",
                 head.name, other.name
             )
         });
@@ -379,27 +379,29 @@ mod tests {
         assert!(told.len() == 1 && told[0].starts_with("c and ") && told[0].contains("flats of one light"), "{told:?}");
     }
 
+    /// A survey of two frames of a level with noise of this scale, the codes of which end at `end`; `white` is what is said to be their end.
+    fn ended(level: f32, scale: f32, end: f32, white: Option<f64>) -> Survey {
+        const SIDE: usize = 16;
+        let noise = |place: usize, frame: usize| ((place * 7919 + frame * 104_729 + place * frame * 31) % 9) as f32;
+        let frame = |frame: usize| {
+            let geometry = Geometry::new(SIDE, SIDE, &["Y"]);
+            let header = FrameHeader { name: "a".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+            let sample = |place: usize| (level + scale * noise(place, frame)).min(end);
+            MemoryFrame::new(header, (0..SIDE * SIDE).map(sample).collect())
+        };
+        survey(&mut [frame(1), frame(2)], white, false).unwrap()
+    }
+
+    fn group(is_lit: bool) -> Group {
+        Group { condition: Condition { is_lit, ..Condition::default() }, level: String::new(), files: Vec::new() }
+    }
+
     /// Flats of one code alone below that which is said to be the largest are the end of codes, where darks are noisy or codes of 8 bits end
     /// there; not where they scatter, nor where that is the largest.
     #[test]
     fn codes_that_end_below_what_is_said_end_there() {
-        const SIDE: usize = 16;
-        let noise = |place: usize, frame: usize| ((place * 7919 + frame * 104_729 + place * frame * 31) % 9) as f32;
-        let of = |level: f32, scale: f32, end: f32| -> Survey {
-            let frame = |frame: usize| {
-                let geometry = Geometry::new(SIDE, SIDE, &["Y"]);
-                let header = FrameHeader { name: "a".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
-                let sample = |place: usize| (level + scale * noise(place, frame)).min(end);
-                MemoryFrame::new(header, (0..SIDE * SIDE).map(sample).collect())
-            };
-            survey(&mut [frame(1), frame(2)], Some(4095.0), false).unwrap()
-        };
-        let group = |is_lit: bool| Group {
-            condition: Condition { is_lit, ..Condition::default() },
-            level: String::new(),
-            files: Vec::new(),
-        };
-        let groups = [group(false), group(true), group(true)];
+        let of = |level: f32, scale: f32, end: f32| ended(level, scale, end, Some(4095.0));
+        let groups = [false, true, true].map(group);
         let end = |dark_scale: f32, end: f32, said: f64| {
             let surveys = [of(10.0, dark_scale, end), of(100.0, 1.0, end), of(5000.0, 1.0, end)];
             end_below(said, &groups, &surveys)
@@ -416,23 +418,8 @@ mod tests {
     /// photosites, which are as noisy as darks, do not, nor do those beside darks without noise.
     #[test]
     fn the_largest_code_is_taken_from_flats_of_one_code() {
-        const SIDE: usize = 16;
-        let noise = |place: usize, frame: usize| ((place * 7919 + frame * 104_729 + place * frame * 31) % 9) as f32;
-        let of = |level: f32, scale: f32, end: f32| -> Survey {
-            let frame = |frame: usize| {
-                let geometry = Geometry::new(SIDE, SIDE, &["Y"]);
-                let header = FrameHeader { name: "a".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
-                let sample = |place: usize| (level + scale * noise(place, frame)).min(end);
-                MemoryFrame::new(header, (0..SIDE * SIDE).map(sample).collect())
-            };
-            survey(&mut [frame(1), frame(2)], None, false).unwrap()
-        };
-        let group = |is_lit: bool| Group {
-            condition: Condition { is_lit, ..Condition::default() },
-            level: String::new(),
-            files: Vec::new(),
-        };
-        let groups = [group(false), group(true), group(true)];
+        let of = |level: f32, scale: f32, end: f32| ended(level, scale, end, None);
+        let groups = [false, true, true].map(group);
         let end_of = |surveys: &mut [Survey]| end_of_codes(&groups, surveys);
         let mut ended = [of(10.0, 1.0, 255.0), of(100.0, 1.0, 255.0), of(254.0, 1.0, 255.0)];
         assert_eq!(end_of(&mut ended), Some(255.0));

@@ -1,6 +1,6 @@
 //! Samples at the ends of the codes, photosites that are full, and where flats saturate.
 
-use super::super::level::{Level, SAME_TIME};
+use super::super::level::{Level, is_same_time};
 
 /// Below this temporal variance in codes² nothing is known of noise: without any, codes have as much half way between two of them.
 /// The standard's limit is 0.24 \[EMVA1288, Sec. 6.4].
@@ -84,15 +84,11 @@ pub fn without_clipped(darks: &[Level], flats: &[Level], rounding: f64) -> (Vec<
     if whole.len() == darks.len() {
         return (whole, false);
     }
-    let is_same = |a: Option<f64>, b: Option<f64>| match (a, b) {
-        (Some(a), Some(b)) => (a - b).abs() <= SAME_TIME * b.abs(),
-        (a, b) => a == b,
-    };
     let timed = || whole.iter().zip(are_whole(&whole)).filter(|(_, is_whole)| *is_whole).map(|(dark, _)| dark);
     let first = timed().find_map(|dark| dark.condition.exposure_s);
     let time = |dark: &Level| dark.condition.exposure_s;
-    let are_several = timed().any(|dark| time(dark).is_some() && !is_same(time(dark), first));
-    let has_own = |flat: &Level| whole.iter().any(|dark| is_same(time(dark), time(flat)));
+    let are_several = timed().any(|dark| time(dark).is_some() && !is_same_time(time(dark), first));
+    let has_own = |flat: &Level| whole.iter().any(|dark| is_same_time(time(dark), time(flat)));
     let is_told = !whole.is_empty() && (are_several || flats.iter().all(has_own));
     if is_told { (whole, true) } else { (darks.to_vec(), false) }
 }

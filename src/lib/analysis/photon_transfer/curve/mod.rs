@@ -21,7 +21,7 @@ pub use ends::{
 };
 
 use super::fit::{Line, Point};
-use super::level::{Level, SAME_TIME};
+use super::level::{Level, SAME_TIME, is_same_time};
 use super::pattern::{Part, fixed};
 use super::scatter::{Component, Scatter};
 use super::settings::Settings;
@@ -163,11 +163,7 @@ impl Curve {
     }
 
     fn beneath(&self, flat: &Point4) -> Beneath {
-        let is_same = |dark: &Point4| match (dark.exposure_s, flat.exposure_s) {
-            (Some(dark), Some(flat)) => (dark - flat).abs() <= SAME_TIME * flat.abs(),
-            (None, None) => true,
-            _ => false,
-        };
+        let is_same = |dark: &Point4| is_same_time(dark.exposure_s, flat.exposure_s);
         match self.darks.iter().position(is_same) {
             Some(dark) => Beneath::Dark(dark),
             None if flat.exposure_s.is_some() && self.times() >= 2 => Beneath::Lines,
