@@ -385,6 +385,38 @@ fn moments_are_as_predicted_at_every_stage() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
+/// Codes of four electrons and more, over which neither light nor the mean of seven dark frames scatters by one: both are rounded alike at
+/// most photosites, and at those that are hot.
+#[test]
+fn dark_frames_of_less_than_a_code_are_predicted() {
+    let trials: Vec<Vec<(String, f64)>> = (0..12_u64)
+        .into_par_iter()
+        .map(|seed| {
+            let mut random = Random(u32::try_from(seed).unwrap(), 1);
+            let [gain, noise_e, hot] =
+                [(0.05, 0.25), (0.5, 1.5), (30.0, 3000.0)].map(|(low, high)| random.within(low, high));
+            let coarse = |readout: &mut ReadOut| {
+                tailed(readout);
+                (readout.adu_per_e, readout.read_noise_e, readout.bits) = (gain, noise_e, 12);
+                (readout.hot_pixel_dark_current_e_per_s, readout.rts_amplitude_e) = (hot, 2.0);
+            };
+            let scene = scene([260, 240], [3.0, 12.0, 7.0], coarse);
+            let plane = plane_of(&digitized(&noisy(&scene, &settings(seed))));
+            let less = less_darks(&plane, &scene, seed, 7);
+            let region = told(&less)
+                .unwrap_or_else(|| panic!("{seed}: {}", of_frame(&less.header, Equations::Exact).unwrap_err()));
+            region.tests.iter().filter_map(|test| test.z.map(|z| (format!("{:?}", test.subject), z))).collect()
+        })
+        .collect();
+    for subject in ["Mean", "Variance"] {
+        let of_subject = trials.iter().flatten().filter(|(of, _)| of == subject);
+        let deviates: Vec<f64> = of_subject.map(|(_, z)| *z).collect();
+        let n = deviates.len() as f64;
+        let rms = (deviates.iter().map(|z| z * z).sum::<f64>() / n).sqrt();
+        assert!(n >= 24.0 && (rms - 1.0).abs() < 4.0 * (0.5 / n).sqrt(), "{subject}: rms {rms} of {n}: {deviates:?}");
+    }
+}
+
 /// Frames small and large raise false alarms no more often than the level.
 #[test]
 fn false_alarms_are_no_more_than_the_level() {

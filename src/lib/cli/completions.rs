@@ -97,10 +97,13 @@ fn of_front(shell: Shell, script: String) -> String {
                  {:24}fi\n{:24}return 0\n{:20}fi\n{:20};;\n",
                 "", "", "", "", "", "", "", "", "", "", ""
             );
-            let cases = cases + &of_program;
+            let at_second =
+                |cases: &str| format!("            case \"${{COMP_WORDS[1]}}\" in\n{cases}            esac\n");
             let previous = "            case \"${prev}\" in\n";
-            let first = format!("            case \"${{COMP_WORDS[1]}}\" in\n{cases}            esac\n{previous}");
-            script.replacen(previous, &first, 1)
+            let script = script.replacen(previous, &format!("{}{previous}", at_second(&cases)), 1);
+            // Before the front door offers its own options.
+            let options = "            if [[ ${cur} == -* ";
+            script.replacen(options, &format!("{}{options}", at_second(&of_program)), 1)
         }
         _ => {
             // The crate completes no words but options in fish.

@@ -69,7 +69,7 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
 }
 
 /// A value that is none as it would be taken: with points for decimal commas, commas for semicolons between numbers, the letter x for
-/// another sign between the sides of a size; nothing where none of these makes a value of it.
+/// another sign between the sides of a size; both where commas may be marks of thousands; nothing where none of these makes a value of it.
 fn respelled(value: &str, command: &Command, words: &[String]) -> Option<String> {
     let points = value.replace(',', ".");
     // `0,5,1,5`: every second comma parts numbers.
@@ -102,7 +102,24 @@ fn respelled(value: &str, command: &Command, words: &[String]) -> Option<String>
     };
     // What takes any word, as the name of a file, says nothing.
     let takes_any = is_taken(&"\u{1}".to_owned());
-    candidates.into_iter().filter(|candidate| candidate != value).find(|candidate| !takes_any && is_taken(candidate))
+    let found = candidates.into_iter().find(|candidate| candidate != value && !takes_any && is_taken(candidate))?;
+    // `1,753` may be 1753 as well.
+    let whole = without_thousands(value).filter(|whole| is_taken(whole));
+    Some(whole.map_or(found.clone(), |whole| format!("{whole}, or {found} where that is meant")))
+}
+
+/// Numbers without marks of thousands, where all commas can be such, alone or between numbers: `8,000,12,000`.
+fn without_thousands(value: &str) -> Option<String> {
+    let parts: Vec<&str> = value.split(',').collect();
+    let are_digits = |part: &str| part.bytes().all(|byte| byte.is_ascii_digit());
+    let may_be = |pair: &[&str]| match pair {
+        [before, behind] => {
+            (1..=3).contains(&before.len()) && !before.starts_with('0') && behind.len() == 3 && are_digits(before)
+        }
+        _ => false,
+    };
+    let are_thousands = parts.chunks(2).all(|pair| may_be(pair) && are_digits(pair[1]));
+    are_thousands.then(|| parts.chunks(2).map(<[&str]>::concat).collect::<Vec<_>>().join(","))
 }
 
 /// Options as people guess them, and what they are here; it counts where the program has the option.

@@ -1,7 +1,6 @@
 //! Amplitudes of hot photosites and of jumps, exponential numbers: the places and weights that sums over them take.
 
-use crate::numerics::gauss::{NODES, laguerre, panel};
-use crate::numerics::rounding::SMOOTH;
+use crate::numerics::gauss::{NODES, few, laguerre, panel};
 use std::sync::LazyLock;
 
 /// Excesses beyond which nothing counts, in units of their mean: e⁻⁴⁰ is 4·10⁻¹⁸.
@@ -18,45 +17,87 @@ pub(super) struct Knee {
     pub reach: f64,
 }
 
-/// Rounding that shows: the distance from code to code, how far it does, and what blurs it: a standard deviation, and how its
-/// square grows with the excess.
+/// The ripple of one number of turns to a code that rounding gives to the mean of photosites by their excess t, which moves the mean
+/// over photosites by e^(left − decay t) times what counts.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Codes {
-    pub period: f64,
-    pub until: f64,
-    pub blur: f64,
-    pub shot: f64,
+struct Ripple {
+    left: f64,
+    decay: f64,
+    /// How fast it changes with the excess, at most.
+    rate: f64,
 }
 
-impl Codes {
-    /// The width of a panel at a place: half a code, or what blurs codes to no finer ripples than a rule follows. Of the ripple of m
-    /// turns to a code e^(−2π²m²σ²) is left, σ in codes, and 12 nodes on a panel of w codes sum it to 10⁻⁹ while π m w < 8.
-    fn panel(&self, place: f64) -> f64 {
-        let blur = (self.blur * self.blur + self.shot * place).sqrt();
-        (1.6 * blur).max(0.5 * self.period)
-    }
+/// Rounding that shows in what photosites differ in.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Ripples {
+    all: Vec<Ripple>,
+    /// Half a code, the narrowest panel that is of use, in units of the mean excess; none where shot noise blurs the excess.
+    narrowest: f64,
+}
 
-    /// Both.
-    pub fn finer(self, other: Self) -> Self {
-        Self {
-            period: self.period.min(other.period),
-            until: self.until.max(other.until),
-            blur: self.blur.min(other.blur),
-            shot: self.shot.min(other.shot),
+/// What rounding makes of photosites which differ by an exponential number.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rounded {
+    /// Their share, and the mean of what they differ in, e⁻.
+    pub share: f64,
+    pub mean_e: f64,
+    /// Whether what they differ in has shot noise.
+    pub is_counted: bool,
+    pub adu_per_e: f64,
+}
+
+impl Ripples {
+    /// Those that move the mean by more than 10⁻⁸ of a code: of m turns to a code, at the angle θ = 2π m K, e^(−D) is left by what
+    /// blurs all photosites alike, `damping(θ)`, over π m; and of counts of mean h t what their characteristic function leaves,
+    /// |e^(h t (e^(iθ) − 1))| = e^(−h t (1 − cos θ)). Ripples that turn but little within the mean excess are smooth as they are.
+    pub fn add(&mut self, of: &Rounded, damping: impl Fn(f64) -> f64) {
+        const COUNTS: f64 = 1e-8;
+        const SMOOTH_RATE: f64 = 0.05;
+        // Of counts the angles come again where a turn is an electron, of less weight each.
+        let most_turns = (2.0 / of.adu_per_e).clamp(64.0, 4096.0);
+        let mut turns = 1.0;
+        while turns <= most_turns && of.share > std::f64::consts::PI * turns * COUNTS {
+            let angle = std::f64::consts::TAU * of.adu_per_e * turns;
+            let left = (of.share / (std::f64::consts::PI * turns * COUNTS)).ln() - damping(angle);
+            let (rate, decay) = match of.is_counted {
+                true => (2.0 * (0.5 * angle).sin().abs(), 1.0 - angle.cos()),
+                false => (angle, 0.0),
+            };
+            let [rate, decay] = [rate, decay].map(|by_electron| by_electron * of.mean_e);
+            if left > 0.0 && rate > SMOOTH_RATE {
+                self.all.push(Ripple { left, decay, rate });
+            }
+            turns += 1.0;
+        }
+        if !of.is_counted {
+            let half = 0.5 / (of.adu_per_e * of.mean_e);
+            self.narrowest = if self.narrowest > 0.0 { self.narrowest.min(half) } else { half };
         }
     }
 
-    /// The ends of its panels; none of too many.
+    /// Whether there are none.
+    pub fn is_none(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// The ends of panels: 12 nodes sum a ripple that changes by a factor e^(16 i), forth or down, to 10⁻⁹; none of too many.
     fn ends(&self) -> Option<Vec<f64>> {
+        const WIDTH: f64 = 16.0;
         let mut ends = Vec::new();
         let mut end = 0.0;
-        while end < self.until.min(REACH) {
+        while end < REACH {
+            let left = self.all.iter().filter(|ripple| ripple.left > ripple.decay * end);
+            let rate = left.map(|ripple| ripple.rate).fold(0.0, f64::max);
+            if rate == 0.0 {
+                break;
+            }
             if ends.len() * NODES > MOST_NODES {
                 return None;
             }
             ends.push(end);
-            end += self.panel(end);
+            end += (WIDTH / rate).max(self.narrowest);
         }
+        ends.push(end);
         Some(ends)
     }
 }
@@ -69,15 +110,9 @@ pub(super) fn telling(share: f64) -> f64 {
     (0_u32..).map(f64::from).take_while(|r| *r < REACH).find(|r| is_beyond(*r)).unwrap_or(REACH)
 }
 
-/// The standard deviation of what blurs codes, in codes, from which such a share of the photosites shows nothing of how they are
-/// rounded: of the ripple, e^(−2π²σ²), it leaves less than 10⁻¹⁰ of a code.
-pub(super) fn smooth_for(share: f64) -> f64 {
-    const LEFT: f64 = 1e-10;
-    let two_pi_squares = 2.0 * std::f64::consts::PI * std::f64::consts::PI;
-    ((share / LEFT).ln().max(0.0) / two_pi_squares).sqrt().min(SMOOTH)
-}
-/// Places and weights of an exponential number of mean 1 for a function that bends at `knees`; none of too many.
-pub(super) fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f64)>> {
+/// Places and weights of an exponential number of mean 1 for a function that bends at `knees`, and is rounded; none of too many. Where
+/// not `is_fine` sums are good to some 10⁻⁶.
+pub(super) fn nodes(knees: &[Knee], ripples: &Ripples, is_fine: bool) -> Option<Vec<(f64, f64)>> {
     static SMOOTH_NODES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(10));
     // e^(−t) grows by the panel: on each of these 12 nodes sum it to 10⁻¹³ of the whole.
     const WIDEST: [f64; 5] = [0.0, 4.0, 10.0, 20.0, REACH];
@@ -87,7 +122,7 @@ pub(super) fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f6
     let is_near =
         |knee: &&Knee| knee.width < SMOOTH_WIDTH && knee.at < REACH + 12.0 * knee.width && knee.at > -12.0 * knee.width;
     let near: Vec<&Knee> = knees.iter().filter(is_near).collect();
-    if near.is_empty() && codes.is_none() {
+    if near.is_empty() && ripples.is_none() {
         return Some(SMOOTH_NODES.clone());
     }
     let mut ends = WIDEST.to_vec();
@@ -101,14 +136,14 @@ pub(super) fn nodes(knees: &[Knee], codes: Option<Codes>) -> Option<Vec<(f64, f6
             distance *= 3.0;
         }
     }
-    if let Some(codes) = codes {
-        ends.extend(codes.ends()?);
-    }
+    ends.extend(ripples.ends()?);
     ends.retain(|end| (0.0..=REACH).contains(end));
     ends.sort_by(f64::total_cmp);
     ends.dedup_by(|next, kept| *next - *kept < 1e-7);
-    let of_panel =
-        |pair: &[f64]| panel(pair[0], pair[1]).map(|(t, weight)| (t, weight * (-t).exp())).collect::<Vec<_>>();
+    let of_panel = |pair: &[f64]| -> Vec<(f64, f64)> {
+        let at = |(t, weight): (f64, f64)| (t, weight * (-t).exp());
+        if is_fine { panel(pair[0], pair[1]).map(at).collect() } else { few(pair[0], pair[1]).map(at).collect() }
+    };
     let mut found: Vec<(f64, f64)> = ends.windows(2).flat_map(of_panel).collect();
     found.retain(|(_, weight)| *weight > 1e-13);
     Some(found)
@@ -123,12 +158,15 @@ mod tests {
     fn nodes_integrate_exponential_numbers() {
         let knee = |at: f64, width: f64| Knee { at, width, reach: 9.0 };
         let cases = [
-            (vec![], None),
-            (vec![knee(0.7, 0.01), knee(-0.1, 0.2), knee(30.0, 2.0)], None),
-            (vec![knee(2.0, 0.3)], Some(Codes { period: 0.3, until: 12.0, blur: 0.0, shot: 0.0 })),
+            (vec![], Ripples::default()),
+            (vec![knee(0.7, 0.01), knee(-0.1, 0.2), knee(30.0, 2.0)], Ripples::default()),
+            (
+                vec![knee(2.0, 0.3)],
+                ripples(&Rounded { share: 1.0, mean_e: 30.0, is_counted: true, adu_per_e: 0.1 }, 0.3),
+            ),
         ];
         for (knees, codes) in cases {
-            let found = nodes(&knees, codes).unwrap();
+            let found = nodes(&knees, &codes, true).unwrap();
             let mean = |f: &dyn Fn(f64) -> f64| found.iter().map(|(t, weight)| weight * f(*t)).sum::<f64>();
             let mut factorial = 1.0;
             for power in 1..=8 {
@@ -139,26 +177,43 @@ mod tests {
             }
             assert!((mean(&|t| (-0.2 * t).exp()) - 1.0 / 1.2).abs() < 1e-9);
         }
-        assert!(nodes(&[], Some(Codes { period: 1e-3, until: f64::INFINITY, blur: 0.0, shot: 0.0 })).is_none());
+        let sharp = Rounded { share: 1.0, mean_e: 1000.0, is_counted: false, adu_per_e: 1.0 };
+        assert!(nodes(&[], &ripples(&sharp, 0.0), true).is_none());
     }
 
-    /// Ripples of m turns to a code, of which blur leaves e^(−2π²m²σ²): ∫ e^(−t) cos(ω t) dt = 1/(1 + ω²).
+    fn ripples(of: &Rounded, read_noise_e: f64) -> Ripples {
+        let mut found = Ripples::default();
+        found.add(of, |angle| 0.5 * (angle * read_noise_e).powi(2));
+        found
+    }
+
+    /// What ripples of m turns to a code leave of the mean, 1/(π m) of a code before anything blurs them: with e^(iφ t) of what is not
+    /// counted and e^(h t (e^(iθ) − 1)) of counts, ∫ e^(−t) e^(z t) dt = 1/(1 − z).
     #[test]
     fn panels_follow_the_ripples_that_blur_leaves() {
-        for (blur, shot) in [(0.0, 0.0), (0.3, 0.0), (1.2, 0.0), (0.1, 1.0 / 6.0)] {
-            let period = 0.5;
-            let codes = Codes { period, until: REACH, blur: blur * period, shot: shot * period };
-            let found = nodes(&[], Some(codes)).unwrap();
-            for turns in [1.0, 2.0, 3.0] {
-                let turn = std::f64::consts::TAU * turns / period;
-                // Shot noise blurs by e^(−s t).
-                let [still, by_place] = [codes.blur.powi(2), codes.shot].map(|square| 0.5 * turn * turn * square);
-                let ripple = |t: f64| (-still - by_place * t).exp() * (turn * t).cos();
+        let cases = [
+            (1.0, 4.0, false, 0.5, 0.0, 3),
+            (1.0, 4.0, false, 0.5, 0.6, 40),
+            (0.3, 40.0, true, 0.1, 0.0, 60),
+            (1e-3, 2000.0, true, 0.02, 1.0, 200),
+            (1.0, 300.0, true, 1.0, 0.2, 20),
+            (0.02, 13.0, true, 1.0 / 51.3, 8.0, 60),
+        ];
+        for (share, mean_e, is_counted, adu_per_e, read_noise_e, most_turns) in cases {
+            let of = Rounded { share, mean_e, is_counted, adu_per_e };
+            let found = nodes(&[], &ripples(&of, read_noise_e), true).unwrap();
+            for turns in 1..=most_turns {
+                let angle = std::f64::consts::TAU * adu_per_e * f64::from(turns);
+                let blurred = (-0.5 * (angle * read_noise_e).powi(2)).exp();
+                let (down, turn) = match is_counted {
+                    true => (mean_e * (1.0 - angle.cos()), mean_e * angle.sin()),
+                    false => (0.0, mean_e * angle),
+                };
+                let ripple = |t: f64| (-down * t).exp() * (turn * t).cos();
                 let sum: f64 = found.iter().map(|(t, weight)| weight * ripple(*t)).sum();
-                let rate = 1.0 + by_place;
-                let expected = (-still).exp() * rate / (rate * rate + turn * turn);
-                // The ripple of m turns of a mean is 1/(π m) of a code: it moves by less than 10⁻⁹ of one.
-                assert!((sum - expected).abs() < 1e-9, "{blur} {shot} {turns}: {sum} {expected}");
+                let expected = (1.0 + down) / ((1.0 + down).powi(2) + turn * turn);
+                let moved = share / (std::f64::consts::PI * f64::from(turns)) * blurred * (sum - expected).abs();
+                assert!(moved < 1e-8, "{of:?} {turns}: {sum} {expected}");
             }
         }
     }

@@ -1,5 +1,6 @@
 //! Moments of the codes of a converter that is not straight, or of these made straight.
 
+use super::effort;
 use crate::metadata::AdcRecord;
 use crate::numerics::gauss::panel;
 use crate::numerics::normal::cumulative;
@@ -35,6 +36,8 @@ pub(super) fn moments(adc: &AdcRecord, ends: Rounding, mean_e: f64, std_e: f64, 
             *moment += weight * (above - below);
         }
     };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "codes, from 0 on")]
+    effort::spend((last - first).min(ONE_BY_ONE) as u64);
     if last - first <= ONE_BY_ONE {
         let mut code = first;
         while code < last {

@@ -3,7 +3,10 @@
 use crate::metadata::PoissonKind;
 use crate::random::poisson::probability;
 use nalgebra::DMatrix;
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::f64::consts::TAU;
+use std::rc::Rc;
 
 /// One of the two charges of a photosite: a count times a sensitivity max(0, 1 + σ z).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -155,9 +158,41 @@ impl Charge {
     }
 
     fn poisson(&self, step: f64) -> Vec<Count> {
-        let rate = self.rate;
+        let known = PROBABILITIES.with_borrow_mut(|known| known.recall(self.rate, step));
+        let count = |&(electrons, weight): &(f64, f64)| Count { electrons, weight, spread: electrons * self.pattern };
+        known.iter().map(count).collect()
+    }
+}
+
+/// Counts and their probabilities that were asked for last, by the rate and the step between them.
+#[derive(Default)]
+struct Probabilities {
+    known: HashMap<[u64; 2], Rc<[(f64, f64)]>>,
+    kept: usize,
+}
+
+thread_local! { static PROBABILITIES: RefCell<Probabilities> = RefCell::default(); }
+
+impl Probabilities {
+    /// So many counts are kept, 8 MB.
+    const MOST: usize = 500_000;
+
+    fn recall(&mut self, rate: f64, step: f64) -> Rc<[(f64, f64)]> {
+        let key = [rate, step].map(f64::to_bits);
+        if let Some(found) = self.known.get(&key) {
+            return Rc::clone(found);
+        }
+        let found: Rc<[(f64, f64)]> = Self::work_out(rate, step).into();
+        if self.kept + found.len() > Self::MOST {
+            *self = Self::default();
+        }
+        self.kept += found.len();
+        self.known.insert(key, Rc::clone(&found));
+        found
+    }
+
+    fn work_out(rate: f64, step: f64) -> Vec<(f64, f64)> {
         let mode = rate.floor();
-        let count = |electrons: f64, weight: f64| Count { electrons, weight, spread: electrons * self.pattern };
         let first = probability(mode, rate);
         let mut found = Vec::new();
         for upward in [false, true] {
@@ -176,14 +211,16 @@ impl Charge {
                 if weight < NEGLIGIBLE * first {
                     break;
                 }
-                found.push(count(electrons, weight));
+                found.push((electrons, weight));
             }
             if !upward {
                 found.reverse();
-                found.push(count(mode, first));
+                found.push((mode, first));
             }
         }
-        normalized(found)
+        let sum: f64 = found.iter().map(|(_, weight)| weight).sum();
+        found.iter_mut().for_each(|(_, weight)| *weight /= sum);
+        found
     }
 }
 

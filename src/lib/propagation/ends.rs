@@ -295,6 +295,16 @@ fn add_beyond(
         nodes.iter().for_each(|node| add(sum, sign * node.weight, straight.beyond(node, direction)));
         return;
     }
+    let farthest = match reading.even_from(full, direction).filter(|_| !has_floors) {
+        Some(distance) if distance < farthest => {
+            let from = full + direction * distance;
+            let beyond = |node: &Node| node.weight * cumulative(direction * (node.mean - from) / node.std);
+            let share: f64 = nodes.iter().map(beyond).sum();
+            add(sum, sign * share, difference(reading.at(from, 0.0), at_full));
+            distance
+        }
+        _ => farthest,
+    };
     let stds = nodes.iter().map(|node| node.std);
     let is_narrow = |std: &f64| *std < MANY * code;
     let widest = stds.clone().fold(0.0, f64::max);
@@ -347,4 +357,50 @@ fn add_beyond(
 
 pub(super) fn difference(a: Moments, b: Moments) -> Moments {
     [0, 1, 2, 3].map(|j| a[j] - b[j])
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::metadata::PoissonKind;
+    use crate::numerics::normal::{cumulative, density};
+    use crate::propagation::law::Law;
+    use crate::random::poisson::probability;
+    use crate::stages::noise::{LineNoise, NoiseModel, Tails};
+
+    /// The share that is read from a level on, below full well and above it: against a sum over counts and sensitivities.
+    #[test]
+    fn shares_beyond_a_level_are_those_of_the_clipped_charge() {
+        let [full, noise_e, prnu] = [1000.0, 5.0, 0.02];
+        let model = NoiseModel {
+            dark_e: 0.0,
+            dcnu: 0.0,
+            prnu,
+            read_noise_e: noise_e,
+            full_well_e: full,
+            dark_shot: true,
+            signal_shot: true,
+            poisson: PoissonKind::Exact,
+            lines: LineNoise::default(),
+            tails: Tails::default(),
+        };
+        for (rate, level) in [(950.0, 980.0), (1080.0, 980.0), (1080.0, 1003.0), (900.0, 990.5)] {
+            let mut expected = 0.0;
+            let step = 0.01;
+            for count in 600..1500 {
+                let count = f64::from(count);
+                let weight = probability(count, rate);
+                if weight < 1e-16 {
+                    continue;
+                }
+                for index in 0..1600 {
+                    let z = -8.0 + step * (f64::from(index) + 0.5);
+                    let charge = (count * (1.0 + prnu * z)).min(full);
+                    expected += weight * step * density(z) * cumulative((charge - level) / noise_e);
+                }
+            }
+            let found = Law::of(&model, rate).is_read_from(level);
+            // The bend at full well costs the sum over z step²/24 times the change of slope there.
+            assert!((found - expected).abs() < 2e-6, "{rate} {level}: {found} {expected}");
+        }
+    }
 }

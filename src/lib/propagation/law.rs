@@ -77,15 +77,19 @@ impl Law {
         const MOST_TURNS: u32 = 64;
         for turns in 1..=MOST_TURNS {
             let angle = TAU * adc.adu_per_e * f64::from(turns);
-            let of_read = 0.5 * (angle * self.read_noise_e).powi(2);
-            if of_read >= HIDDEN {
+            if 0.5 * (angle * self.read_noise_e).powi(2) >= HIDDEN {
                 return true;
             }
-            if of_read + self.light.damping(angle) + self.dark.damping(angle) < HIDDEN {
+            if self.damping(angle) < HIDDEN {
                 return false;
             }
         }
         false
+    }
+
+    /// The least −ln |E e^(iθy)| of what any photosite reads, y in electrons, where nothing cuts it off.
+    pub fn damping(&self, angle: f64) -> f64 {
+        0.5 * (angle * self.read_noise_e).powi(2) + self.light.damping(angle) + self.dark.damping(angle)
     }
 
     /// Whether full well, or sensitivities of zero, cut the charge off.
@@ -93,6 +97,19 @@ impl Law {
         self.reaches_full_well()
             || self.light.is_rectified(self.full_well_e)
             || self.dark.is_rectified(self.full_well_e)
+    }
+
+    /// The standard deviation, in e⁻, of a normal error that would leave of no ripple more than 1/m of what charge and read noise leave
+    /// of any, m its turns to a code: of the one that they leave most of.
+    pub fn blur_by_turns_e(&self, adc: &AdcRecord) -> f64 {
+        const MOST_TURNS: u32 = 64;
+        let spread_e = self.least_pattern_std();
+        let left = |turns: u32| {
+            let angle = TAU * adc.adu_per_e * f64::from(turns);
+            f64::from(turns).ln() + 0.5 * (angle * spread_e).powi(2) + self.damping(angle)
+        };
+        let least = (1..=MOST_TURNS).map(left).fold(f64::INFINITY, f64::min);
+        (2.0 * least).sqrt() / (TAU * adc.adu_per_e)
     }
 
     /// Whether no end of the codes is within reach.

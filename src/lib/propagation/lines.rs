@@ -296,6 +296,9 @@ impl Photosite {
             None if !self.has_tails() => Err(Unpredictable::Beyond(TOO_COARSE)),
             Some(Regime::Curved) if self.drifts() && !self.has_tails() => Err(Unpredictable::Beyond(DRIFT_CUT)),
             Some(regime) if regime == Regime::Straight || !self.has_tails() => Ok(regime),
+            Some(Regime::Curved) if !is_cut && self.adc.as_ref().is_some_and(is_within) => {
+                Err(Unpredictable::Beyond(COARSE_LINES))
+            }
             _ => Err(Unpredictable::Beyond(WITH_LINES)),
         }
     }
@@ -372,6 +375,10 @@ enum Regime {
 const WITH_LINES: &str = "full well or an end of the codes cuts off what rows or columns share, on a sensor that has hot \
                                      pixels or random telegraph signals";
 
+/// Why nothing is said of it where codes show.
+const COARSE_LINES: &str = "it shows how codes are rounded, which hot pixels or random telegraph signals beside noise of rows or columns \
+                            hide from no formula here; give the sensor read noise";
+
 /// What of a photosite's own spread blurs codes, e⁻: shot noise counts as far as whole electrons are no whole codes.
 pub(super) fn blur_e(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> f64 {
     /// ADU per electron up to which codes take several electrons.
@@ -379,12 +386,12 @@ pub(super) fn blur_e(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> f6
     let law = Law::of(model, expected_e);
     let turn = std::f64::consts::TAU;
     let counts = if model.signal_shot { expected_e } else { 0.0 } + if model.dark_shot { model.dark_e } else { 0.0 };
-    let shot = if adc.adu_per_e <= FEW {
-        2.0 * counts * (1.0 - (turn * adc.adu_per_e).cos()) / (turn * adc.adu_per_e).powi(2)
-    } else {
-        0.0
-    };
-    law.read_noise_e.hypot(law.least_pattern_std()).hypot(shot.sqrt())
+    let own = law.read_noise_e.hypot(law.least_pattern_std());
+    if adc.adu_per_e > FEW {
+        return own.max(law.blur_by_turns_e(adc));
+    }
+    let shot = 2.0 * counts * (1.0 - (turn * adc.adu_per_e).cos()) / (turn * adc.adu_per_e).powi(2);
+    own.hypot(shot.sqrt())
 }
 
 /// Standard normal numbers and their weights for a function that is smooth on the scale of `blur` of what they are times

@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 /// The last answers of a thread, by what was asked, and the evaluations that each took.
 pub(super) struct Memory<Key, Answer>(RefCell<VecDeque<(Key, Answer, u64)>>);
 
-/// As many answers as one scene asks for.
-const KEPT: usize = 48;
+/// As many answers as one scene asks for, with those of all kinds of its hot photosites.
+const KEPT: usize = 1024;
 
 impl<Key: PartialEq, Answer: Copy> Memory<Key, Answer> {
     pub const fn new() -> Self {

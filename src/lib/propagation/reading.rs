@@ -140,6 +140,14 @@ impl Reading {
         }
     }
 
+    /// How far from a charge, up (`direction` 1) or down (−1), the chance to be beyond a level is one number, to 10⁻¹⁷; none of other
+    /// readings.
+    pub fn even_from(&self, electrons: f64, direction: f64) -> Option<f64> {
+        let Asked::Beyond(level) = self.asked else { return None };
+        let end = level - self.offset_e + direction * REACH * self.noise_e;
+        Some((direction * (end - electrons)).max(0.0))
+    }
+
     /// Whether all charges between two are read as one code, with their read noise.
     pub fn is_one(&self, least: f64, most: f64) -> bool {
         let reach = REACH * self.noise_e;

@@ -1,7 +1,8 @@
 //! How much of a frame is saturated, by the law of its scene.
 
+use super::charge::charge;
 use super::frame::{FramePrediction, Sites, of_frame};
-use super::ground::{has_tails, quantity_of_sites};
+use super::ground::{Ground, has_tails, quantity_of_sites};
 use super::law::Law;
 use super::moments::{Equations, Prediction};
 use super::taps;
@@ -34,6 +35,9 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
     if has_tails(frame) {
         return true;
     }
+    if are_far_below(&bounding, levels) {
+        return false;
+    }
     let of_class = |class: Prediction| (class.moments.mean, class.moments.std());
     let moments: Vec<[(f64, f64); 3]> = match of_frame(&bounding, Equations::Exact) {
         Ok(FramePrediction::Planes(classes)) => vec![classes.map(of_class)],
@@ -46,6 +50,28 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
     };
     let is_beyond = |(level, (mean, std)): (f32, (f64, f64))| f64::from(level) - mean > OUT_OF_REACH * std;
     !moments.into_iter().all(|moments| levels.classes().into_iter().zip(moments).all(is_beyond))
+}
+
+/// Whether the charge of each class, with all that is added to it, is as far below the level: what can be told in no time of frames that
+/// nothing was made of since they were read.
+fn are_far_below(frame: &FrameHeader, levels: &FullLevels) -> bool {
+    let metadata = &frame.metadata;
+    let is_made = metadata.demosaic.is_some() || metadata.correction.is_some() || metadata.average.is_some();
+    let Ok(ground) = Ground::of(frame, Equations::Exact) else { return false };
+    if is_made || metadata.is_transferred() || ground.photosite.has_tails() {
+        return false;
+    }
+    let model = &ground.photosite.model;
+    let is_far = |(level, expected_e): (f32, f64)| {
+        let level_e = match (ground.quantity, ground.photosite.adc) {
+            (QuantityKind::Electrons, _) => f64::from(level),
+            (QuantityKind::Adu, Some(adc)) if !adc.is_linearized => adc.electrons_at(f64::from(level) - 0.5),
+            _ => return false,
+        };
+        let charge = charge(model, expected_e);
+        level_e - charge.mean > OUT_OF_REACH * charge.variance.max(0.0).sqrt().hypot(model.added())
+    };
+    levels.classes().into_iter().zip(ground.smeared.expected_e).all(is_far)
 }
 
 /// The expected shares of the samples of R, G and B that count as full: that are read from [`least_full_e`] on. None where the

@@ -10,7 +10,7 @@
 //! with w the weights of quadrature in t and s: Gauss and Laguerre's, exact for polynomials of degree 19, where nothing ends or
 //! shows how codes are rounded as far as e^(−40); else panels that narrow towards full well and the ends of the codes.
 
-use super::amplitudes::{Codes, Knee, REACH, nodes, smooth_for, telling};
+use super::amplitudes::{Knee, REACH, Ripples, Rounded, nodes, telling};
 use super::budget::{Budget, Cause};
 use super::charge::charge;
 use super::effort;
@@ -23,7 +23,6 @@ use super::photosite::Photosite;
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::numerics::averages::Combine;
 use crate::numerics::gauss::laguerre;
-use crate::numerics::rounding::SMOOTH;
 use crate::stages::noise::{NoiseModel, Tails};
 use std::sync::LazyLock;
 
@@ -46,10 +45,6 @@ const BENT: &str = "hot pixels or random telegraph signals before a converter th
 /// Why nothing is said where rounding shows.
 const TOO_FINE: &str = "hot pixels or random telegraph signals go over many codes, and what each photosite has of its own blurs none of \
                         them; give the sensor read noise";
-
-/// Why nothing is said of dark frames that show how codes are rounded.
-const FINE_DARKS: &str =
-    "dark or bias frames of less than a code of noise came off a frame with hot pixels or random telegraph signals";
 
 /// Why nothing is said of what is curved.
 pub(super) const CURVED: &str = "hot pixels and random telegraph signals reach too far for the series of what is curved in the \
@@ -120,12 +115,6 @@ impl Photosite {
         if self.darks.iter().flatten().any(|dark| dark.frames > 2 && dark.combine != Combine::Mean) {
             return beyond(NO_MEANS);
         }
-        if let Some(adc) = self.adc.filter(|_| self.darks[0].is_some()) {
-            let is_fine = |dark: &Dark| self.rounds_as(&adc, 0.0, dark, &self.of_dark(dark));
-            if self.darks.iter().flatten().any(is_fine) {
-                return beyond(FINE_DARKS);
-            }
-        }
         let amplitude_e = self.most(|tails| tails.rts_e);
         let is_too_fine = |expected_e: f64| {
             self.hot_nodes(expected_e, true).is_none()
@@ -162,6 +151,11 @@ impl Photosite {
             kinds.extend(nodes.iter().map(|(t, weight)| (*t, hot_share * weight)));
         }
         let sum: f64 = kinds.iter().map(|(_, weight)| weight).sum();
+        let amplitude_e = self.most(|tails| tails.rts_e);
+        let jumps_show =
+            |hot: f64| trap_share > 0.0 && self.at(&State { hot, trap: 0.0 }).jumps_show(expected_e, amplitude_e);
+        let of_hot = kinds.iter().skip(1).filter(|(hot, _)| jumps_show(*hot)).map(|(_, weight)| weight / sum);
+        let matter_if_hot = self.jumps_matter(expected_e, trap_share * of_hot.sum::<f64>());
         let mut found = Vec::new();
         let mut foreseen = effort::Foreseen::of(kinds.len() - 1);
         // Most photosites first, then hot ones from all over, which tell early how much work all are.
@@ -174,7 +168,7 @@ impl Photosite {
                 break;
             }
             let quiet = self.at(&State { hot, trap: 0.0 });
-            let jumps_apart = trap_share > 0.0 && quiet.jumps_show(expected_e, self.most(|tails| tails.rts_e));
+            let jumps_apart = (hot == 0.0 || matter_if_hot) && jumps_show(hot);
             let is_free = trap_share > 0.0 && !jumps_apart;
             let share = if jumps_apart { 1.0 - trap_share } else { 1.0 };
             found.push(Kind { weight: weight * share, is_free, value: of(&quiet) });
@@ -205,6 +199,20 @@ impl Photosite {
             let high = high.min(model.full_well_e + 9.0 * model.added());
             adc.adu_per_e * own < BLURRED || low - REACH * amplitude_e < lower || high + REACH * amplitude_e > upper
         })
+    }
+
+    /// Whether it matters how jumps of such a share of the photosites, which are hot too, are rounded or end: they add less than their share
+    /// times the square of their mean amplitude to the variance that the others have, and a fourth of the amplitude to a mean.
+    fn jumps_matter(&self, expected_e: f64, share: f64) -> bool {
+        const NEGLIGIBLE: f64 = 2e-7;
+        let amplitude = self.slope() * self.most(|tails| tails.rts_e);
+        if share <= 0.0 {
+            return false;
+        }
+        let others = self.at(&State { hot: 0.0, trap: 0.0 }).moments(expected_e).moments;
+        let is_little = share * amplitude * amplitude <= NEGLIGIBLE * others.variance
+            && 0.25 * share * amplitude <= NEGLIGIBLE * others.std();
+        !is_little
     }
 
     /// Cumulants 2, 4 and 6 of what jumps add to samples, those of averages that came off included: given its amplitude a, what is
@@ -244,7 +252,7 @@ impl Photosite {
     /// Amplitudes of hot photosites; where `is_fine` as many as tell how codes are rounded.
     fn hot_nodes(&self, expected_e: f64, is_fine: bool) -> Option<Vec<(f64, f64)>> {
         let mut knees: Vec<Knee> = Vec::new();
-        let mut codes: Option<Codes> = None;
+        let mut ripples = Ripples::default();
         for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_hot()) {
             let hot_e = model.tails.hot_e;
             let cold = charge(model, light_e);
@@ -259,30 +267,24 @@ impl Photosite {
             let variance = cold.variance + model.added().powi(2);
             let farthest = telling(model.tails.hot_share * hot_e * hot_e / variance);
             knees.retain(|knee| knee.at - 3.0 * knee.width < farthest);
-            let Some(adc) = self.adc.filter(|_| is_fine) else { continue };
-            let law = Law::of(model, light_e);
-            let blur_e = model.added().hypot(law.least_pattern_std());
-            let smooth = smooth_for(model.tails.hot_share);
-            if adc.adu_per_e * blur_e >= smooth || !adc.is_bent() && law.counts_hide(&adc) {
-                continue;
+            if let Some(adc) = self.adc.filter(|_| is_fine) {
+                let law = Law { trap_e: 0.0, ..Law::of(model, light_e) };
+                let of = Rounded {
+                    share: model.tails.hot_share,
+                    mean_e: hot_e,
+                    is_counted: model.dark_shot,
+                    adu_per_e: adc.adu_per_e,
+                };
+                ripples.add(&of, |angle| law.damping(angle));
             }
-            // Shot noise blurs codes beyond so many electrons.
-            let until = if model.dark_shot { (SMOOTH / adc.adu_per_e).powi(2) + 60.0 } else { f64::INFINITY };
-            let next = Codes {
-                period: (1.0 / adc.adu_per_e).max(6.0) / hot_e,
-                until: until / hot_e,
-                blur: blur_e / hot_e,
-                shot: if model.dark_shot { 1.0 / hot_e } else { 0.0 },
-            };
-            codes = Some(codes.map_or(next, |known: Codes| known.finer(next)));
         }
-        nodes(&knees, codes)
+        nodes(&knees, &ripples, is_fine)
     }
 
     fn trap_nodes(&self, expected_e: f64) -> Option<Vec<(f64, f64)>> {
-        let Some(adc) = self.adc else { return nodes(&[], None) };
+        let Some(adc) = self.adc else { return nodes(&[], &Ripples::default(), true) };
         let mut knees = Vec::new();
-        let mut codes = None;
+        let mut ripples = Ripples::default();
         for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_rts()) {
             let amplitude_e = model.tails.rts_e;
             let cold = charge(model, light_e);
@@ -295,12 +297,16 @@ impl Photosite {
                 reach: 24.0,
             }));
             let quiet = model.at(&State { hot: 0.0, trap: 0.0 });
-            if adc.adu_per_e * blur_e(&quiet, &adc, light_e) < BLURRED {
-                let [period, blur] = [1.0 / adc.adu_per_e, quiet.added()].map(|width_e| width_e / amplitude_e);
-                codes = Some(Codes { period, until: f64::INFINITY, blur, shot: 0.0 });
-            }
+            let law = Law::of(&quiet, light_e);
+            let of = Rounded {
+                share: model.tails.rts_share,
+                mean_e: amplitude_e,
+                is_counted: false,
+                adu_per_e: adc.adu_per_e,
+            };
+            ripples.add(&of, |angle| law.damping(angle));
         }
-        nodes(&knees, codes)
+        nodes(&knees, &ripples, true)
     }
 
     /// Moments of the samples of all kinds of photosites together.
@@ -343,10 +349,10 @@ impl Photosite {
         (found, of_means)
     }
 
-    /// The mean over all kinds of photosites of a number that jumps do not change where they are free; no number where it takes too
-    /// long.
+    /// The mean over all kinds of photosites of a number that no rounding shows in, and that jumps do not change where they are free, to
+    /// some 10⁻⁶ of what the hot ones have; no number where it takes too long.
     pub(super) fn mean_of(&self, expected_e: f64, of: impl Fn(&Self) -> f64) -> f64 {
-        let mean = || self.each(expected_e, of).iter().map(|kind| kind.weight * kind.value).sum();
+        let mean = || self.each_of(expected_e, false, of).iter().map(|kind| kind.weight * kind.value).sum();
         effort::within(MOST_WORK, mean).unwrap_or(f64::NAN)
     }
 

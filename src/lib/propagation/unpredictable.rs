@@ -2,7 +2,7 @@
 
 /// Why nothing is said of what takes too long.
 pub(super) const TOO_LONG: &str = "hot pixels or random telegraph signals go over so many counts and codes that the sum of what is made \
-                                   of each would take too long; give the sensor read noise";
+                                   of each would take too long";
 
 /// Why nothing is said of offsets beside patterns that take too long.
 pub(super) const OFFSETS_TOO_LONG: &str = "fixed offsets beside patterns of the charge, over codes that show or end, take too many \
