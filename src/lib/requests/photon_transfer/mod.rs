@@ -16,7 +16,9 @@ use crate::formats::frame_list::{self, FrameList};
 use crate::metadata::FrameHeader;
 use crate::text::counted;
 use crate::units::QuantityKind;
-use checks::{check_alike, check_apart, check_array, doubt_of_codes, doubt_of_end, doubt_of_frames};
+use checks::{
+    check_alike, check_apart, check_array, doubt_of_array, doubt_of_codes, doubt_of_end, doubt_of_frames,
+};
 use clap::Args;
 use conditions::{Group, Reading, grouped, in_folder};
 use rayon::prelude::*;
@@ -112,6 +114,7 @@ impl PhotonTransfer {
             notes.push(doubt_of_end(&list_name, largest));
         }
         check_array(first, &groups, &taken.found)?;
+        notes.extend(doubt_of_array(first, &groups, &taken.found));
         notes.extend(doubt_of_frames(&groups, &taken.found));
         let settings =
             Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes, top: largest };
