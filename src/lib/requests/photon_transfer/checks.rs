@@ -313,6 +313,24 @@ pub fn doubt_of_frames(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
     groups.iter().zip(surveys).filter_map(doubt).collect()
 }
 
+/// Warnings of frames whose fixed pattern is not that of the others of their condition, by most of the grids.
+pub fn doubt_of_patterns(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
+    let doubt = |(group, survey): (&Group, &Survey)| {
+        let are_told = |frame: &usize| {
+            2 * survey.sites.iter().filter(|site| site.strangers.contains(frame)).count() > survey.sites.len()
+        };
+        let strangers: Vec<usize> = (0..group.files.len()).filter(are_told).collect();
+        let first = group.files[*strangers.first()?].display();
+        let more = if strangers.len() > 1 { format!(" and {} more", strangers.len() - 1) } else { String::new() };
+        let others = if group.condition.is_lit { "flats of its light" } else { "darks of its time" };
+        Some(Note::Warning(format!(
+            "{first}{more}: its fixed pattern is not that of the other {others}: is it turned, mirrored or moved, or of another camera or temperature? \
+             Temporal noise and patterns are wrong with it"
+        )))
+    };
+    groups.iter().zip(surveys).filter_map(doubt).collect()
+}
+
 /// Places of the least and of the largest.
 fn ends_of(means: &[f64]) -> [usize; 2] {
     let mut order: Vec<usize> = (0..means.len()).collect();

@@ -18,6 +18,7 @@ use crate::text::counted;
 use crate::units::QuantityKind;
 use checks::{
     check_alike, check_apart, check_array, doubt_of_array, doubt_of_codes, doubt_of_end, doubt_of_frames,
+    doubt_of_patterns,
 };
 use clap::Args;
 use conditions::{Group, Reading, grouped, in_folder};
@@ -116,6 +117,7 @@ impl PhotonTransfer {
         check_array(first, &groups, &taken.found)?;
         notes.extend(doubt_of_array(first, &groups, &taken.found));
         notes.extend(doubt_of_frames(&groups, &taken.found));
+        notes.extend(doubt_of_patterns(&groups, &taken.found));
         let settings =
             Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes, top: largest };
         let temperature_k = main_temperature(&groups);

@@ -157,7 +157,7 @@ fn off_line(misfit: f64, freedom: f64, besides: f64) -> Option<(String, bool)> {
     is_beyond.then(|| {
         let text = format!(
             "means of darks miss their line over exposure time by {} ADU more than their frames scatter by: the black level moves \
-             between them, or exposure times are wrong; intervals of dark current, black level and linearity take that in",
+             between them, exposure times are wrong, or the sensor was warmer for some; intervals of dark current, black level and linearity take that in",
             in_digits(besides.sqrt(), 3)
         );
         (text, true)
