@@ -127,3 +127,27 @@ fn a_row_of_a_frame_is_divided_by_that_of_a_flat() {
     assert!(flat.means_adu[0] > 3000.0 && flat.means_adu[1] > 3000.0, "{:?}", flat.means_adu);
     assert_eq!((flat.means_adu[2], flat.photosites), (0.0, vec![80, 80, 0]));
 }
+
+/// Flats of RGGB whose greens agree and whose red is a tenth above blue are said to be of GRBG or BGGR: of the first alone the greens
+/// seem to differ, and the patterns that fit are named.
+#[test]
+fn flats_behind_another_pattern_are_told() {
+    let shop = Workshop::new();
+    write_fits(&shop, "light.fits", SIZE, &[], lit([4000.0, 6000.0, 3000.0], 1));
+    write_fits(&shop, "flat.fits", SIZE, &[], lit([5500.0, 7000.0, 5000.0], 2));
+    let doubts = |pattern: &str| {
+        let line = "correct-frame light.fits --black 500 --white 16000 --flat flat.fits -o out.exr --cfa ";
+        shop.said(&format!("{line}{pattern}"), 0)
+    };
+    let said = doubts("grbg");
+    assert!(
+        said.contains("flat.fits: photosites of each 2x2 of the sensor have ")
+            && said.contains("the two greens of grbg differ by 9.")
+            && said.contains("is the pattern rggb or bggr?"),
+        "{said}"
+    );
+    for pattern in ["rggb", "bggr"] {
+        let said = doubts(pattern);
+        assert!(!said.contains("is the pattern"), "{said}");
+    }
+}

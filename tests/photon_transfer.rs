@@ -505,6 +505,75 @@ fn clipped_darks_do_not_change_the_gain() {
     }
 }
 
+/// Where all darks are clipped, black is not their mean. Of flats of one exposure time, whose black may lie far below that, the responsivity is
+/// the same, and in its interval as often as is stated; there is no PRNU. Of flats of several times, above unknown dark charges, there is
+/// no responsivity either.
+#[test]
+fn clipped_darks_are_not_black() {
+    const BELOW_ADU: f64 = 200.0;
+    let held: Vec<Option<bool>> = (0..20_u32)
+        .into_par_iter()
+        .map(|index| {
+            let readout = camera(index, Kind::Ccd);
+            let [flats, darks] = levels(&readout, index);
+            let clipped = [Level { at_ends: [0.0, 0.3], ..darks[0].clone() }];
+            let lowered: Vec<Level> =
+                flats.iter().map(|flat| Level { mean: flat.mean - BELOW_ADU, ..flat.clone() }).collect();
+            let [own, low] = [&flats, &lowered].map(|flats| found(flats, &clipped));
+            for key in ["prnu", "prnu_pixel", "prnu_row", "prnu_column"] {
+                assert!(why(&low, key).contains("clipped at code 0"), "{index}: {key}");
+            }
+            let [own, low] = [own, low].map(|found| found.get("responsivity_adu_per_photon").unwrap());
+            assert!((own.value / low.value - 1.0).abs() < 1e-9, "{index}: {own:?} {low:?}");
+            let truths: BTreeMap<&str, f64> = truths(&readout, index).into_iter().collect();
+            Some((low.low..=low.high).contains(&truths["responsivity_adu_per_photon"]))
+        })
+        .collect();
+    check_misses("responsivity", held.into_iter());
+    let readout = ReadOut { full_well_e: 20_000.0, ..camera(3, Kind::Ccd) };
+    let [flats, darks] = lit_by_time(&readout, 3);
+    let clipped: Vec<Level> = darks.iter().map(|dark| Level { at_ends: [0.0, 0.3], ..dark.clone() }).collect();
+    let found = found(&flats, &clipped);
+    for key in ["responsivity_adu_per_photon", "quantum_efficiency"] {
+        assert!(why(&found, key).contains("clipped at code 0"), "{key}");
+    }
+}
+
+/// Black levels that rise, or fall, evenly by 1 ADU over all frames, while darks are taken in the order of their times: what of that looks like
+/// dark current is within its interval, as often as is stated, and it is told of.
+#[test]
+fn a_black_level_that_drifts_is_no_dark_current() {
+    /// Frames of [`levels_of`].
+    const FRAMES: f64 = 56.0;
+    let held: Vec<Option<bool>> = (0..20_u32)
+        .into_par_iter()
+        .map(|index| {
+            // Noise of 0.6 codes, which means of few frames of few photosites leave less of than of the drift.
+            let readout = ReadOut {
+                bits: 14,
+                adu_per_e: 0.5,
+                full_well_e: 20_000.0,
+                read_noise_e: 1.2,
+                dark_current_e_per_s: Some(4.0),
+                ..camera(index, Kind::Ccd)
+            };
+            let drift_adu = if index % 2 == 0 { 1.0 } else { -1.0 } / FRAMES;
+            let [flats, darks, _] = levels_of((&readout, index, Shake { drift_adu, ..Shake::default() }));
+            let found = found(&flats, &darks);
+            let mut told = found.doubts.iter().chain(&found.notes);
+            assert!(
+                told.any(|told| told.contains("drift from frame to frame") || told.contains("the black level moves")),
+                "{index}: {:?} {:?}",
+                found.doubts,
+                found.notes
+            );
+            let current = found.get("dark_current_e_per_s")?;
+            Some((current.low..=current.high).contains(&readout.dark_current_e_per_s.unwrap()))
+        })
+        .collect();
+    check_misses("dark_current_e_per_s", held.into_iter());
+}
+
 /// An uncertainty of all numbers of photons together is one of what they tell, however many levels there are.
 #[test]
 fn an_error_of_all_photons_does_not_average_out() {

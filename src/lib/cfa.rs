@@ -1,6 +1,11 @@
 //! Which sensor class a photosite belongs to.
 //!
-//! [`CfaPattern`] is one of the four Bayer patterns, which most stages work on; [`FilterArray`] describes any array.
+//! [`CfaPattern`] is one of the four Bayer patterns, which most stages work on; [`FilterArray`] describes any array;
+//! [`Places`] hold it against what flat fields show.
+
+mod places;
+
+pub use places::Places;
 
 use serde::de::Visitor;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};

@@ -104,6 +104,8 @@ pub struct Shake {
     pub black_adu: f64,
     /// Of exposure times from level to level, relative.
     pub time: f64,
+    /// How much the black level rises from each frame to the next, in codes: no scatter.
+    pub drift_adu: f64,
 }
 
 /// Temperature of further darks, beside 300 K.
@@ -121,7 +123,8 @@ impl Shake {
             let mut chance = Chance { camera: 10_000 * (which + 1) + index, drawn: 12 * place };
             (0..12).map(|_| chance.uniform()).sum::<f64>() - 6.0
         };
-        [1.0 + self.light * normal(frame, 0), self.black_adu * normal(frame, 1), 1.0 + self.time * normal(first, 2)]
+        let black_adu = self.black_adu * normal(frame, 1) + self.drift_adu * f64::from(frame);
+        [1.0 + self.light * normal(frame, 0), black_adu, 1.0 + self.time * normal(first, 2)]
     }
 }
 

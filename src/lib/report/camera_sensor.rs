@@ -292,8 +292,10 @@ fn lines_of(camera: &MeasuredCamera, stack: usize, axis: usize) -> f64 {
         camera.patterns.iter().filter_map(|views| Some(views[stack].as_ref()?.lines[axis])).collect();
     let count = found.len().max(1) as f64;
     let variance = found.iter().map(|[variance, _]| variance).sum::<f64>() / count;
+    // Classes share rows and columns: of these no more is known than the class tells that has most.
+    let of_one = found.iter().map(|[_, scatter]| *scatter).fold(f64::INFINITY, f64::min);
     let scatter = found.iter().map(|[_, scatter]| scatter * scatter).sum::<f64>().sqrt() / count;
-    if variance > 2.0 * scatter { variance.sqrt() } else { 0.0 }
+    if variance > 2.0 * scatter.max(of_one) { variance.sqrt() } else { 0.0 }
 }
 
 /// The bits that hold a code.

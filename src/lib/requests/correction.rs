@@ -351,6 +351,7 @@ impl Correction {
         if let Some((flats, means)) = &flats {
             warnings.extend_from_slice(flats.warnings());
             warnings.extend(doubt_of_flats(means));
+            warnings.extend(means.doubt.clone());
         }
         warnings.extend(beyond.and_then(doubt_of_limits));
         let sources =

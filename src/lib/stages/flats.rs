@@ -6,6 +6,8 @@
 //! classes are whole: of cells of the filter array none of whose photosites is saturated or defective. So the means of all classes are of the
 //! same places, and light that falls off towards the corners is the same share of each.
 
+mod tally;
+
 use crate::camera::levels::BlackLevels;
 use crate::error::Result;
 use crate::frame::to_sample;
@@ -17,8 +19,8 @@ use crate::stages::saturation::{DEFECTIVE, FullLevels, SATURATED};
 use crate::stages::sites::SiteClasses;
 use crate::stages::transfer::{Passage, Transfer};
 use crate::stream::RowSource;
-use std::f64::consts::PI;
 use std::ops::Range;
+use tally::Tally;
 
 /// What no light reads in flats.
 #[derive(Debug)]
@@ -56,6 +58,8 @@ pub struct FlatMeans {
     pub full: u64,
     /// Ordinary values of F by class, ADU.
     limits: Option<Vec<[f64; 2]>>,
+    /// What is wrong with the array that they are said to be behind.
+    pub doubt: Option<String>,
 }
 
 impl FlatMeans {
@@ -67,58 +71,6 @@ impl FlatMeans {
     /// The same with ordinary values of F, ADU by class, beyond which photosites are defective.
     pub fn within(self, limits: &[[f64; 2]]) -> Self {
         Self { limits: Some(limits.to_vec()), ..self }
-    }
-}
-
-/// Sums over the photosites of classes.
-struct Tally {
-    sums: Vec<f64>,
-    counts: Vec<u64>,
-    /// Photosites that are neither saturated nor defective, in whole cells and beside them.
-    good: Vec<u64>,
-    full: Vec<u64>,
-    finite: Vec<u64>,
-    /// Sizes of the differences between photosites of a class and the next ones in rows of whole cells: their sum, and how many.
-    changes: Vec<[f64; 2]>,
-    /// The last photosite of each class in a row.
-    last: Vec<Option<f64>>,
-    /// Whether each cell of a row of cells is whole.
-    whole: Vec<bool>,
-}
-
-impl Tally {
-    fn new(classes: usize) -> Self {
-        let none = || vec![0; classes];
-        Self {
-            sums: vec![0.0; classes],
-            counts: none(),
-            good: none(),
-            full: none(),
-            finite: none(),
-            changes: vec![[0.0; 2]; classes],
-            last: vec![None; classes],
-            whole: Vec::new(),
-        }
-    }
-
-    /// Takes in a photosite of a class in a whole cell, right of those before in its row.
-    fn take(&mut self, class: usize, flat: f64) {
-        self.sums[class] += flat;
-        self.counts[class] += 1;
-        if let Some(before) = self.last[class].replace(flat) {
-            let [sum, count] = self.changes[class];
-            self.changes[class] = [sum + (flat - before).abs(), count + 1.0];
-        }
-    }
-
-    /// The standard deviation of a class by the differences of neighbors, which slopes and dark corners leave alone; none of few.
-    ///
-    /// σ = √π/2 ⟨|x − x′|⟩        of normal noise
-    fn scatter(&self, class: usize) -> Option<f64> {
-        /// So many tell it to about 10 %.
-        const LEAST: f64 = 64.0;
-        let [sum, count] = self.changes[class];
-        (count >= LEAST).then(|| 0.5 * PI.sqrt() * sum / count)
     }
 }
 
@@ -326,13 +278,15 @@ impl<S: RowSource> FlatFrames<S> {
         for (row, plane) in lines {
             let of_row = self.classes.row(first + row, plane);
             tally.last.fill(None);
+            let [x0, y0] = self.head.geometry.origin.map(|origin| usize::from(origin & 1 != 0));
+            let of_rows = (first + row + y0) % 2 * 2;
             for (cell, flats) in self.made[(row * planes + plane) * width..][..width].chunks_exact(columns).enumerate()
             {
                 if tally.whole.get(cell) != Some(&true) {
                     continue;
                 }
-                for (x, flat) in flats.iter().enumerate() {
-                    tally.take(of_row[(cell * columns + x) % of_row.len()], *flat);
+                for (x, flat) in (cell * columns..).zip(flats) {
+                    tally.take(of_row[x % of_row.len()], of_rows + (x + x0) % 2, *flat);
                 }
             }
         }
@@ -378,7 +332,15 @@ impl<S: RowSource> FlatFrames<S> {
             )));
         }
         let left_out = good.iter().zip(counts).map(|(good, count)| good - count).collect();
-        Ok(FlatMeans { means, photosites: counts.clone(), left_out, full: full.iter().sum(), limits })
+        let doubt = self.doubt_of_array(tally);
+        Ok(FlatMeans { means, photosites: counts.clone(), left_out, full: full.iter().sum(), limits, doubt })
+    }
+
+    /// What is wrong with the Bayer array that they are said to be behind, where what photosites scatter by is known.
+    fn doubt_of_array(&self, tally: &Tally) -> Option<String> {
+        let array =
+            self.head.metadata.cfa.filter(|array| array.bayer().is_some() && self.classes.period() == [2, 2])?;
+        Some(format!("{}: {}", self.head.name, tally.places()?.doubt(array)?))
     }
 
     /// What metadata keep of them.

@@ -42,6 +42,7 @@ pub fn doubts(curve: &Curve, flats: &[Level], suspects: &[Suspect], confidence: 
         missed(curve),
         drifting(curve, flats),
         bent(curve, confidence).filter(|_| !is_named),
+        cut_off(curve, flats),
     ];
     all.into_iter().flatten().collect()
 }
@@ -116,6 +117,28 @@ fn drifting(curve: &Curve, flats: &[Level]) -> Option<String> {
             "light {way} by {:.2} % from frame to frame, at one level after another: numbers of photons are wrong where the lamp \
              drifts on between levels, and responsivity and quantum efficiency with them",
             mean.abs() * 100.0
+        )
+    })
+}
+
+/// Temporal noise of flats that has no tails, as where a camera mends what is far off.
+fn cut_off(curve: &Curve, flats: &[Level]) -> Option<String> {
+    /// Noise that is rounded, to codes of its standard deviation or finer, lacks less.
+    const LEAST: f64 = -0.1;
+    /// A variance of less codes² is one of few codes.
+    const LEAST_VARIANCE: f64 = 1.0;
+    let [mut all, mut sum] = [0.0; 2];
+    for flat in curve.fitted().iter().map(|&flat| &flats[flat]).filter(|flat| flat.variance >= LEAST_VARIANCE) {
+        for [excess, variance] in flat.sites.iter().map(|site| site.excess) {
+            all += 1.0 / variance;
+            sum += excess / variance;
+        }
+    }
+    let excess = sum / all;
+    (excess < LEAST && excess < -BEYOND / all.sqrt()).then(|| {
+        format!(
+            "temporal noise of flats has fewer samples far off than noise has, an excess kurtosis of {excess:.2}: where the camera mends or smooths \
+             samples by itself, the gain is wrong, and dark noise with it; take frames without its noise reduction"
         )
     })
 }

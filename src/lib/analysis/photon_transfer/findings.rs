@@ -292,7 +292,8 @@ fn add_patterns(
         [("prnu", Part::Total), ("prnu_row", Part::Row), ("prnu_column", Part::Column), ("prnu_pixel", Part::Pixel)]
     {
         let result = match (flat, dark) {
-            (Some((index, flat)), Some((_, dark))) if curve.knows_black(index) => {
+            // Of darks that code 0 cuts off neither black nor what comes off the pattern is known.
+            (Some((index, flat)), Some((_, dark))) if curve.knows_black(index) && !curve.are_darks_clipped => {
                 let signal = curve.signal(index);
                 let spread = of_light(flat, dark, part, confidence).root();
                 if spread.high > 0.0 { Ok(spread.map(|spread| spread / signal)) } else { Err(NO_NOISE.into()) }

@@ -21,6 +21,7 @@ mod scatter;
 mod settings;
 mod sheet;
 mod sites;
+mod strangers;
 mod stuck;
 mod survey;
 mod suspects;

@@ -99,11 +99,14 @@ pub fn of_light(flat: &Level, dark: &Level, part: Part, confidence: f64) -> Inte
     combination(&found, confidence)
 }
 
-/// What temporal noise of whole columns, and of whole rows, leaves in the mean of a level's frames: variances.
-pub fn left_in_mean(level: &Level) -> [f64; 2] {
-    /// The value hangs on none.
-    const ANY: f64 = 0.95;
-    [Part::Column, Part::Row].map(|part| temporal(&[level], part, ANY).value.max(0.0) / level.frames as f64)
+/// What temporal noise of whole columns, and of whole rows, leaves in the mean of a level's frames: variances, and what they scatter by.
+pub fn left_in_mean(level: &Level) -> [[f64; 2]; 2] {
+    /// That of a standard deviation to both sides.
+    const ONE: f64 = 0.682_689_492_137_085_9;
+    [Part::Column, Part::Row].map(|part| {
+        let Interval { value, low, high } = temporal(&[level], part, ONE);
+        [value.max(0.0), (high - low) / 2.0].map(|of| of / level.frames as f64)
+    })
 }
 
 /// Variance that a part of the temporal noise has, over several levels that have it alike.

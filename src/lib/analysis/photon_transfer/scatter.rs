@@ -65,6 +65,15 @@ pub fn among(freedom: f64, misfit: impl Fn(f64) -> f64, largest: f64) -> Compone
     Component { variance, freedom: freedom.max(LEAST) }
 }
 
+/// How the mean of darks drifts from one frame of a level to the next, alike at all levels.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Drift {
+    /// By so much at most, in samples; 0 where one of 500 cameras without any shows as much.
+    pub most: f64,
+    /// Whether it is far beyond chance.
+    pub is_sure: bool,
+}
+
 /// What frames scatter by beyond the noise of their samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scatter {
@@ -72,6 +81,8 @@ pub struct Scatter {
     pub black: Component,
     /// That of the light, relative, from frame to frame.
     pub light: Component,
+    /// How means of darks drift from frame to frame.
+    pub drift: Drift,
     /// What is to be said of it, and whether it is a doubt.
     pub told: Vec<(String, bool)>,
 }
@@ -125,7 +136,7 @@ impl Scatter {
         };
         let [black, light] = [0, 1].map(component);
         let are_timed = darks.iter().all(|dark| dark.condition.exposure_s.is_some());
-        Self { black, light, told: told(&means, found, are_timed) }
+        Self { black, light, drift: drift(darks, found[0]), told: told(&means, found, are_timed) }
     }
 
     /// What the mean of a level is uncertain by from its black, a variance.
@@ -137,6 +148,39 @@ impl Scatter {
     pub fn of_light(&self, level: &Level) -> Component {
         self.light.times(1.0 / level.frames as f64)
     }
+}
+
+/// How far means of darks drift from frame to frame, at most, where that is alike at all levels and beyond chance, of a black level that scatters
+/// by such a variance.
+///
+/// Σ w (k − k̄)(m_k − m̄) / Σ w (k − k̄)²        over the frames k of all levels, w = 1/(v + τ²)
+fn drift(darks: &[Level], black: f64) -> Drift {
+    /// What is as sure is reckoned with, and what is told.
+    const SURE: [f64; 2] = [0.999, 0.9999];
+    /// No more than the upper end of such an interval.
+    const HIGH: f64 = 0.975;
+    let [mut products, mut squares, mut all, mut freedom] = [0.0, 0.0, 0.0, -1.0];
+    for dark in darks {
+        let count = dark.frames as f64;
+        let weight = 1.0 / (dark.mean_variance * count + black).max(f64::MIN_POSITIVE);
+        let means = || (0..dark.frames).map(|frame| dark.frame_mean(frame));
+        let mean = means().sum::<f64>() / count;
+        for (place, own) in means().enumerate() {
+            let at = place as f64 - (count - 1.0) / 2.0;
+            products += weight * at * (own - mean);
+            squares += weight * at * at;
+            all += weight * (own - mean).powi(2);
+        }
+        freedom += count - 1.0;
+    }
+    if freedom < 1.0 {
+        return Drift::default();
+    }
+    let slope = products / squares;
+    let scatter = ((all - slope * products).max(0.0) / freedom / squares).sqrt();
+    let [is_any, is_sure] = SURE.map(|sure| slope.abs() > of_student(sure, freedom) * scatter);
+    let most = slope.abs() + of_student(HIGH, freedom) * scatter;
+    if is_any { Drift { most, is_sure } } else { Drift::default() }
 }
 
 /// τ² and φ².

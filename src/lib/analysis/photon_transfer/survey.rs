@@ -31,7 +31,7 @@ pub struct Survey {
     pub picture: Option<Vec<f32>>,
     /// The bits that codes have, of the first rows.
     pub bits: u32,
-    /// Means of the sites of each 2x2, row by row, of the first rows of the first frame's first plane.
+    /// Means of the sites of each 2x2, row by row, of the first frame's first plane.
     pub quad: [f64; 4],
     /// What tells each frame from all others; none where noise does not.
     pub prints: Vec<Print>,
@@ -81,7 +81,7 @@ pub fn survey_as<S: RowSource>(frames: &mut [S], asked: &Asked) -> Result<Survey
     let mut picture = keeps.then(|| vec![0.0; geometry.row_samples() * geometry.height]);
     let step = frames.iter().map(|frame| geometry.band_rows(frame.natural_rows(), 1)).max().unwrap_or(1).max(1);
     let mut bands: Vec<Vec<f32>> = vec![Vec::new(); frames.len()];
-    let (mut done, mut bits, mut quad) = (0, 0, [0.0; 4]);
+    let (mut done, mut bits, mut quad) = (0, 0, Quad::default());
     let mut prints = Prints::new(frames.len(), geometry.height);
     while done < geometry.height {
         let rows = step.min(geometry.height - done);
@@ -91,8 +91,8 @@ pub fn survey_as<S: RowSource>(frames: &mut [S], asked: &Asked) -> Result<Survey
         })?;
         if done == 0 {
             bits = bands.iter().flatten().fold(0, |bits, sample| bits | whole(*sample));
-            quad = quad_of(&bands[0], geometry.row_samples(), geometry.width);
         }
+        quad.add(done, &bands[0], &geometry);
         for row in 0..rows {
             let samples = geometry.row_samples();
             prints.add(done + row, &bands, row * samples..(row + 1) * samples);
@@ -110,7 +110,7 @@ pub fn survey_as<S: RowSource>(frames: &mut [S], asked: &Asked) -> Result<Survey
     if sites.iter().any(|site| !(site.mean.is_finite() && site.variance.is_finite())) {
         return Err(Error::format(&header.name, "it, or one with it, holds samples that are not finite"));
     }
-    Ok(Survey { geometry, sites, picture, bits, quad, prints: prints.finish() })
+    Ok(Survey { geometry, sites, picture, bits, quad: quad.means(), prints: prints.finish() })
 }
 
 /// A sample as a code; of what is no whole number all bits.
@@ -120,17 +120,28 @@ fn whole(sample: f32) -> u32 {
     if f64::from(code) == f64::from(sample) { code } else { u32::MAX }
 }
 
-/// Means of the sites of each 2x2 of the first plane of some rows.
-fn quad_of(band: &[f32], row_samples: usize, width: usize) -> [f64; 4] {
-    let (mut sums, mut counts) = ([0.0; 4], [0_u32; 4]);
-    for (y, row) in band.chunks_exact(row_samples).enumerate() {
-        for (x, sample) in row[..width].iter().enumerate() {
-            let site = y % 2 * 2 + x % 2;
-            sums[site] += f64::from(*sample);
-            counts[site] += 1;
+/// Sums over the sites of each 2x2 of a frame's first plane, row by row, and how many samples they are of.
+#[derive(Default)]
+struct Quad([(f64, f64); 4]);
+
+impl Quad {
+    /// Adds rows, the first of which is row `first` of the frame.
+    fn add(&mut self, first: usize, band: &[f32], geometry: &Geometry) {
+        for (y, row) in band.chunks_exact(geometry.row_samples()).enumerate() {
+            let pairs = row[..geometry.width].chunks(2);
+            let of_row = &mut self.0[(first + y) % 2 * 2..][..2];
+            for pair in pairs {
+                for ((sum, count), sample) in of_row.iter_mut().zip(pair) {
+                    *sum += f64::from(*sample);
+                    *count += 1.0;
+                }
+            }
         }
     }
-    [0, 1, 2, 3].map(|site| sums[site] / f64::from(counts[site].max(1)))
+
+    fn means(&self) -> [f64; 4] {
+        self.0.map(|(sum, count)| sum / f64::max(count, 1.0))
+    }
 }
 
 /// Fewer rows or columns have no variance between them worth the name.

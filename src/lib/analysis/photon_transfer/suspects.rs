@@ -50,7 +50,9 @@ pub fn suspects(
             }
         }
     }
-    found.extend(curve.into_iter().flat_map(|curve| off_response(curve, flats, scatter)));
+    // Above the mean of what code 0 cuts off little light has too little signal.
+    let of_black = curve.filter(|curve| !curve.are_darks_clipped);
+    found.extend(of_black.into_iter().flat_map(|curve| off_response(curve, flats, scatter)));
     found
 }
 

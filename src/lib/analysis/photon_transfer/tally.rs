@@ -2,6 +2,7 @@
 
 use super::lanes::{depart, dot, sum};
 use super::sites::Site;
+use super::strangers::{RowSlopes, excess};
 use super::stuck::StandIn;
 use crate::numerics::variance_components::{MeanSquare, MeanSquares, SquareSums};
 use crate::numerics::vectors::{self, Instructions, Kernel};
@@ -39,6 +40,10 @@ pub struct SiteSurvey {
     pub fourth: f64,
     /// Means of the frames.
     pub frame_means: Vec<f64>,
+    /// Excess kurtosis of the temporal noise, and what it scatters by, a variance.
+    pub excess: [f64; 2],
+    /// Frames whose fixed pattern is not that of the others.
+    pub strangers: Vec<usize>,
     /// Two frames whose samples are the same, or differ by one number alone, though they vary from photosite to photosite.
     pub copies: Option<[usize; 2]>,
 }
@@ -82,6 +87,8 @@ pub struct Tally {
     squares: f64,
     /// Σ a_k (ȳ − c) of each frame.
     products: Vec<f64>,
+    /// What each frame of a row has of their mean.
+    slopes: RowSlopes,
     /// Σ d² and Σ d⁴, d the differences of ȳ between neighbors in a row.
     steps: [f64; 2],
     /// Σ q and Σ q², q the sum of squares of a photosite about its row.
@@ -121,6 +128,7 @@ impl Tally {
             column_means: vec![0.0; columns],
             squares: 0.0,
             products: vec![0.0; frames],
+            slopes: RowSlopes::new(frames),
             steps: [0.0; 2],
             within: [0.0; 2],
             samples: vec![0.0; columns * frames],
@@ -219,8 +227,9 @@ impl Tally {
             *above = mean - self.center;
             *of_column += *above;
         }
-        self.row_means.push(sum(&self.above));
-        self.squares += dot(&self.above, &self.above);
+        let (above, squares) = (sum(&self.above), dot(&self.above, &self.above));
+        self.row_means.push(above);
+        self.squares += squares;
         for (squared, pair) in self.squared.iter_mut().zip(self.above.windows(2)) {
             *squared = (pair[1] - pair[0]).powi(2);
         }
@@ -238,6 +247,7 @@ impl Tally {
                 depart(samples, &self.means, &self.above, [of_columns, &mut self.column_squares]);
             self.frame_sums[index] += of_row;
             self.products[index] += product;
+            self.slopes.add(product - of_row * above / count, squares - above * above / count);
             self.row_sums.push(of_row);
             all += square;
             let about = of_row / count;
@@ -361,6 +371,8 @@ impl Tally {
         let MeanSquares { rows: of_rows, columns: of_columns, rest } = MeanSquares::of(spatial, self.size, 1.0);
         let [of_rows, of_columns, rest] = [of_rows, of_columns, rest].map(|square| square.with_tails(fourth, n));
         let variance = all.max(0.0) / ((frames - 1.0) * (n - 2.0));
+        let spatial = MeanSquares { rows: of_rows, columns: of_columns, rest };
+        let strangers = std::mem::take(&mut self.slopes).strangers(self.size, &spatial, &temporal);
         SiteSurvey {
             frames: self.frames,
             size: self.size,
@@ -373,7 +385,9 @@ impl Tally {
             full: self.full.1,
             largest: (self.top == f64::INFINITY).then_some(self.largest),
             temporal,
-            spatial: MeanSquares { rows: of_rows, columns: of_columns, rest },
+            spatial,
+            excess: excess(self.within, self.frames, n),
+            strangers,
             fourth,
             frame_means: drifts.iter().map(|drift| mean + drift).collect(),
             copies,

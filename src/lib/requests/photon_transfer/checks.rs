@@ -2,6 +2,7 @@
 
 use super::conditions::{Group, Head};
 use crate::analysis::photon_transfer::{LEAST_VARIANCE, Print, SiteSurvey, Survey};
+use crate::cfa::Places;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::{FrameHeader, Metadata};
@@ -136,6 +137,40 @@ pub fn check_array(head: &FrameHeader, groups: &[Group], surveys: &[Survey]) -> 
         return Err(Error::Usage(problem).give(&["cfa"]));
     }
     Ok(())
+}
+
+/// A warning of an array, Bayer or none, that is not what the photosites of flats are behind.
+pub fn doubt_of_array(head: &FrameHeader, groups: &[Group], surveys: &[Survey]) -> Option<Note> {
+    /// Flats near such a share of the brightest are well above black, and below saturation.
+    const SHARE: f64 = 0.5;
+    /// More samples than this share at the largest code, and means do not follow the light.
+    const FEW: f64 = 1e-3;
+    let array = head.metadata.cfa.filter(|_| head.geometry.channels.len() == 1 && head.geometry.height >= 2)?;
+    let mean = |survey: &Survey| survey.quad.iter().sum::<f64>() / 4.0;
+    let of_kind = |is_lit: bool| {
+        let own = groups.iter().zip(surveys).filter(move |(group, _)| group.condition.is_lit == is_lit);
+        own.map(|(_, survey)| survey)
+    };
+    let at_top = |site: &SiteSurvey| site.at_ends[0] as f64 / (site.count() * site.frames) as f64;
+    let is_whole = |survey: &&Survey| survey.sites.iter().all(|site| at_top(site) <= FEW);
+    let dark = of_kind(false).min_by(|a, b| mean(a).total_cmp(&mean(b)));
+    let black = dark.map_or([0.0; 4], |dark| dark.quad);
+    let middle = SHARE * of_kind(true).map(mean).fold(0.0, f64::max) + (1.0 - SHARE) * dark.map_or(0.0, mean);
+    let off = |survey: &Survey| (mean(survey) - middle).abs();
+    let flat = of_kind(true).filter(is_whole).min_by(|a, b| off(a).total_cmp(&off(b)))?;
+    let scatter = |survey: &Survey| {
+        let all: usize = survey.sites.iter().map(SiteSurvey::count).sum();
+        let of = |site: &SiteSurvey| site.variance + site.spatial.rest.value;
+        4.0 * survey.sites.iter().map(of).fold(0.0, f64::max) / all as f64
+    };
+    let variance = scatter(flat) + dark.map_or(0.0, scatter);
+    // The sensor's corner need not be the frame's.
+    let [x0, y0] = head.geometry.origin.map(|origin| usize::from(origin & 1 != 0));
+    let mut places = Places { signal: [0.0; 4], variance: [variance; 4] };
+    for (place, (flat, black)) in flat.quad.iter().zip(black).enumerate() {
+        places.signal[(place / 2 + y0) % 2 * 2 + (place + x0) % 2] = flat - black;
+    }
+    places.doubt(array).map(|doubt| Note::Warning(format!("{}: {doubt}", head.name)))
 }
 
 /// The temporal variance of darks in codes² of which photosites that are full spread over several codes.
@@ -278,6 +313,24 @@ pub fn doubt_of_frames(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
     groups.iter().zip(surveys).filter_map(doubt).collect()
 }
 
+/// Warnings of frames whose fixed pattern is not that of the others of their condition, by most of the grids.
+pub fn doubt_of_patterns(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
+    let doubt = |(group, survey): (&Group, &Survey)| {
+        let are_told = |frame: &usize| {
+            2 * survey.sites.iter().filter(|site| site.strangers.contains(frame)).count() > survey.sites.len()
+        };
+        let strangers: Vec<usize> = (0..group.files.len()).filter(are_told).collect();
+        let first = group.files[*strangers.first()?].display();
+        let more = if strangers.len() > 1 { format!(" and {} more", strangers.len() - 1) } else { String::new() };
+        let others = if group.condition.is_lit { "flats of its light" } else { "darks of its time" };
+        Some(Note::Warning(format!(
+            "{first}{more}: its fixed pattern is not that of the other {others}: is it turned, mirrored or moved, or of another camera or temperature? \
+             Temporal noise and patterns are wrong with it"
+        )))
+    };
+    groups.iter().zip(surveys).filter_map(doubt).collect()
+}
+
 /// Places of the least and of the largest.
 fn ends_of(means: &[f64]) -> [usize; 2] {
     let mut order: Vec<usize> = (0..means.len()).collect();
@@ -377,6 +430,53 @@ mod tests {
         assert!(told.len() == 1 && told[0].contains(" and b are taken to be darks of one exposure"), "{told:?}");
         let told = of([100.0, 100.0, 100.0], [200.0, 200.0, 100.0]);
         assert!(told.len() == 1 && told[0].starts_with("c and ") && told[0].contains("flats of one light"), "{told:?}");
+    }
+
+    /// A camera of RGGB of which a frame begins at an odd column is told from GRBG and from one without filters, and the patterns that fit are
+    /// named, though one photosite is at the largest code in all frames; what is said rightly is not doubted, nor a flat of little light.
+    #[test]
+    fn an_array_that_does_not_fit_is_named() {
+        const SIDE: usize = 32;
+        let groups = [group(false), group(true), group(true)];
+        let doubt = |array: &str, scale: f32| {
+            let of = |light: f32| {
+                let frame = |frame: usize| {
+                    let mut geometry = Geometry::new(SIDE, SIDE, &["Y"]);
+                    geometry.origin = [3, 0];
+                    let mut metadata = Metadata::new(QuantityKind::Adu);
+                    metadata.cfa = Some(array.parse().unwrap());
+                    let sample = |place: usize| {
+                        let [x, y] = [place % SIDE + 3, place / SIDE];
+                        let response = [0.5, 1.0, 1.01, 0.6][y % 2 * 2 + x % 2];
+                        let noise = ((place * 7919 + frame * 104_729 + place * frame * 31) % 9) as f32;
+                        if place == 40 { 4095.0 } else { 64.0 + light * response + noise }
+                    };
+                    let header = FrameHeader { name: "a".into(), geometry, metadata };
+                    MemoryFrame::new(header, (0..SIDE * SIDE).map(sample).collect())
+                };
+                survey(&mut [frame(1), frame(2)], Some(4095.0), false).unwrap()
+            };
+            let surveys = [of(0.0), of(500.0 * scale), of(1000.0 * scale)];
+            let mut geometry = Geometry::new(SIDE, SIDE, &["Y"]);
+            geometry.origin = [3, 0];
+            let mut metadata = Metadata::new(QuantityKind::Adu);
+            metadata.cfa = Some(array.parse().unwrap());
+            let head = FrameHeader { name: "a".into(), geometry, metadata };
+            doubt_of_array(&head, &groups, &surveys).map(|note| note.text().to_owned())
+        };
+        for array in ["rggb", "bggr"] {
+            assert_eq!(doubt(array, 1.0), None);
+        }
+        for array in ["grbg", "gbrg"] {
+            let told = doubt(array, 1.0).unwrap();
+            assert!(
+                told.contains(&format!("greens of {array} differ by 16.")) && told.ends_with("rggb or bggr?"),
+                "{told}"
+            );
+        }
+        assert!(doubt("monochrome", 1.0).unwrap().ends_with("is the array rggb or bggr?"));
+        assert_eq!(doubt("monochrome", 1e-3), None);
+        assert_eq!(doubt("grbg", 1e-3), None);
     }
 
     /// A survey of two frames of a level with noise of this scale, the codes of which end at `end`; `white` is what is said to be their end.

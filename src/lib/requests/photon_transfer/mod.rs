@@ -16,7 +16,10 @@ use crate::formats::frame_list::{self, FrameList};
 use crate::metadata::FrameHeader;
 use crate::text::counted;
 use crate::units::QuantityKind;
-use checks::{check_alike, check_apart, check_array, doubt_of_codes, doubt_of_end, doubt_of_frames};
+use checks::{
+    check_alike, check_apart, check_array, doubt_of_array, doubt_of_codes, doubt_of_end, doubt_of_frames,
+    doubt_of_patterns,
+};
 use clap::Args;
 use conditions::{Group, Reading, grouped, in_folder};
 use rayon::prelude::*;
@@ -112,7 +115,9 @@ impl PhotonTransfer {
             notes.push(doubt_of_end(&list_name, largest));
         }
         check_array(first, &groups, &taken.found)?;
+        notes.extend(doubt_of_array(first, &groups, &taken.found));
         notes.extend(doubt_of_frames(&groups, &taken.found));
+        notes.extend(doubt_of_patterns(&groups, &taken.found));
         let settings =
             Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes, top: largest };
         let temperature_k = main_temperature(&groups);
@@ -231,9 +236,9 @@ fn patterns(
         (level.frames >= 2).then(|| (left_in_mean(&level), Blur::of(&level, rounding)))
     };
     let [(of_flat, flat_blur), (of_dark, dark_blur)] = [0, 1].map(|stack| left(stack).unwrap_or_default());
-    let without = |mut view: PatternView, left: [f64; 2]| {
-        for ([variance, _], left) in view.lines.iter_mut().zip(left) {
-            *variance -= left;
+    let without = |mut view: PatternView, left: [[f64; 2]; 2]| {
+        for ([variance, scatter], [left, of_left]) in view.lines.iter_mut().zip(left) {
+            (*variance, *scatter) = (*variance - left, scatter.hypot(of_left));
             // It came off that of single photosites as a part of rows and columns, and as one of all noise.
             view.rest[0] += left;
         }
@@ -249,7 +254,11 @@ fn patterns(
         let share = |index: usize| (f64::from(flat[index]) - f64::from(dark[index])) / signal;
         let (noise, hidden) = (flat_blur.noise.hypot(dark_blur.noise), flat_blur.hidden + dark_blur.hidden);
         let view = pattern_view(&own, size, &share, Blur { noise: noise / signal, hidden: hidden / signal }, draws)?;
-        Some(without(view, [0, 1].map(|axis| (of_flat[axis] + of_dark[axis]) / (signal * signal))))
+        let of_axis = |axis: usize| {
+            let ([flat, of_flat], [dark, of_dark]) = (of_flat[axis], of_dark[axis]);
+            [flat + dark, of_flat.hypot(of_dark)].map(|of| of / (signal * signal))
+        };
+        Some(without(view, [0, 1].map(of_axis)))
     };
     let (light, dark) = rayon::join(of_light, of_dark_alone);
     [light, dark]

@@ -15,13 +15,16 @@ pub struct Bend {
 }
 
 impl Curve {
-    /// How much of the gain a response that bends makes it miss; none of light that is not known.
+    /// How much of the gain a response that bends makes it miss; none of light that is not known, nor where darks do not tell black.
     ///
     /// Where a signal is R x (1 + ε x), of shot noise alone its variance is (1 + 2 ε x)² of that of a straight response over
     /// (1 + ε x): to first order 3 ε x more at signal K n, which the line through the levels takes for gain.
     ///
     /// What rounding hides of the black level is common to all levels: of what it lets the share be the least counts.
     pub fn bend(&self) -> Option<Bend> {
+        if self.are_darks_clipped {
+            return None;
+        }
         let bends = [-1.0, 0.0, 1.0].map(|sign| self.bend_above(sign));
         let [Some(Bend { missed: low, .. }), Some(own), Some(Bend { missed: high, .. })] = bends else { return None };
         let missed = if low * high <= 0.0 {

@@ -11,7 +11,9 @@
 
 mod bend;
 mod ends;
+mod intervals;
 mod point;
+mod response;
 mod weights;
 
 pub use bend::Bend;
@@ -63,12 +65,16 @@ pub struct Curve {
     pub is_silent: bool,
     /// Whether darks are clipped at 0, and too few others are there.
     pub are_darks_clipped: bool,
+    /// Whether the response is told by how the mean of flats of one exposure time rises with light, whatever black is.
+    is_response_free: bool,
     /// The share of the light that signals miss their line by, beyond what they scatter by: a standard deviation.
     pub light_error: f64,
     /// What is to be said of darks whose means miss their line over time by more than they scatter, and whether it is a doubt.
     pub dark_told: Option<(String, bool)>,
     /// What means of darks miss that line by besides.
     dark_besides: Component,
+    /// How far the black level may have moved from the darks of the shortest time to those of the longest, at most, in their order.
+    dark_drift: f64,
     confidence: f64,
     photon_error: f64,
     rounding: f64,
@@ -122,9 +128,11 @@ impl Curve {
             is_offset_free: is_silent || are_darks_clipped,
             is_silent: is_silent && !darks.is_empty(),
             are_darks_clipped,
+            is_response_free: false,
             light_error: 0.0,
             dark_told: None,
             dark_besides: Component::NONE,
+            dark_drift: 0.0,
             confidence: settings.confidence,
             photon_error: settings.photon_error,
             rounding,
@@ -144,10 +152,13 @@ impl Curve {
         if !curve.is_offset_free && curve.fitted.iter().any(|&index| curve.beneath[index] == Beneath::Unknown) {
             curve.is_offset_free = true;
         }
+        curve.is_response_free = are_darks_clipped && curve.are_of_one_time();
         let needed = if curve.is_offset_free { 2 } else { 1 };
         if curve.fitted.len() < needed {
             return None;
         }
+        // Between any two darks all other frames may have been taken.
+        curve.drift_over(scatter.drift, flats.iter().chain(darks).map(|level| level.frames).sum());
         curve.weigh();
         Some(curve)
     }
@@ -337,14 +348,6 @@ impl Curve {
         }
     }
 
-    fn response_points(&self) -> impl Iterator<Item = Point> + Clone {
-        self.fitted.iter().enumerate().filter_map(|(place, &flat)| {
-            let photons = self.flats[flat].photons?;
-            let weight = self.weights.response.get(place).copied().unwrap_or(1.0 / photons.value.max(1.0));
-            (self.beneath[flat] != Beneath::Unknown).then_some(Point { x: photons.value, y: self.signal(flat), weight })
-        })
-    }
-
     /// What scatters beneath a flat: of the mean and of the variance of no light.
     fn scatter_beneath(&self, flat: usize) -> [f64; 2] {
         match self.beneath[flat] {
@@ -381,59 +384,12 @@ impl Curve {
             dark_variance: dark_variance.filter(|_| has_darks),
             dark_mean: mean.filter(|_| has_darks),
             black: self.dark_lines().map(|[mean, _]| mean.offset).filter(|_| has_darks),
-            responsivity: Line::through_zero(self.response_points()).map(|line| line.slope),
+            responsivity: self.response_line().map(|line| line.slope),
             dark_slope: lines.map(|[mean, _]| mean.slope).filter(|_| has_darks),
             dark_variance_slope: lines
                 .map(|[_, variance]| variance.slope)
                 .filter(|_| has_darks && self.tells_dark_noise()),
         })
-    }
-
-    /// The interval of a number that follows from the values, at such confidence; none where it does not follow.
-    pub fn interval(&self, of: impl Fn(&Values) -> Option<f64>, confidence: f64) -> Option<Interval> {
-        let value = of(&self.values()?)?;
-        let (mut variance, mut hidden) = (0.0, 0.0);
-        let mut moved = self.clone();
-        let mut add = |curve: &mut Self, datum: &dyn Fn(&mut Self) -> Option<&mut Datum>| {
-            let Some(Datum { value: at, variance: own, hidden: most }) = datum(curve).copied() else { return };
-            let step = if own > 0.0 { own.sqrt() } else { most };
-            if step <= 0.0 {
-                return;
-            }
-            let mut ends = [value; 2];
-            for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
-                if let Some(datum) = datum(curve) {
-                    datum.value = at + sign * step;
-                }
-                *end = curve.values().as_ref().and_then(&of).unwrap_or(value);
-            }
-            if let Some(datum) = datum(curve) {
-                datum.value = at;
-            }
-            let slope = (ends[1] - ends[0]) / 2.0;
-            variance += if own > 0.0 { slope.powi(2) } else { 0.0 };
-            hidden += (slope / step * most).abs();
-        };
-        for &flat in &self.fitted {
-            add(&mut moved, &|curve| Some(&mut curve.flats[flat].mean));
-            add(&mut moved, &|curve| Some(&mut curve.flats[flat].variance));
-            add(&mut moved, &|curve| curve.flats[flat].photons.as_mut());
-        }
-        for dark in 0..self.darks.len() {
-            add(&mut moved, &|curve| Some(&mut curve.darks[dark].mean));
-            add(&mut moved, &|curve| Some(&mut curve.darks[dark].variance));
-        }
-        // All numbers of photons are off alike.
-        let ends = [-1.0, 1.0].map(|sign| {
-            let mut moved = self.clone();
-            let scale = 1.0 + sign * self.photon_error;
-            moved.flats.iter_mut().filter_map(|flat| flat.photons.as_mut()).for_each(|photons| photons.value *= scale);
-            moved.values().as_ref().and_then(&of).unwrap_or(value)
-        });
-        variance += ((ends[1] - ends[0]) / 2.0).powi(2);
-        let Interval { low, high, .. } = Interval::normal(value, variance, confidence);
-        // What rounding hides of one level it may hide of all alike, and no chance makes it less.
-        Some(Interval { value, low: low - hidden, high: high + hidden })
     }
 
     /// What the mean above no light scatters by: noise; black levels, whose frames scatter so; and what darks miss their line by.

@@ -90,8 +90,11 @@ impl Curve {
                 continue;
             }
             if which == 0 {
-                let told = off_line(misfit(0.0), freedom, found.variance);
-                (self.dark_besides, self.dark_told) = (found, told);
+                let missed = misfit(0.0);
+                self.dark_drift = self.dark_drift.max(self.drift_of(missed, freedom, found.variance.sqrt()));
+                self.dark_besides = found;
+                let told = off_line(missed, freedom, found.variance);
+                self.dark_told = self.dark_told.take().or(told);
             }
             for dark in &mut self.darks {
                 let datum = if which == 0 { &mut dark.mean } else { &mut dark.variance };
@@ -106,15 +109,35 @@ impl Curve {
         }
     }
 
+    /// How far black may have moved from the first of the darks to the last, in the order of their times, where they miss their line by so much
+    /// beyond chance: most of what moves evenly is taken for dark current, and only the rest is missed.
+    fn drift_of(&self, misfit: f64, freedom: f64, missed: f64) -> f64 {
+        /// What is less likely is reckoned with.
+        const LEVEL: f64 = 1e-2;
+        /// Of times that are even the line hides all: no more than so many times what is missed is reckoned with.
+        const MOST: f64 = 10.0;
+        if significance::of_chi_square(misfit, freedom) >= LEVEL {
+            return 0.0;
+        }
+        let places = self.darks.iter().zip(self.places_in_time()).filter(|(dark, _)| dark.is_whole);
+        let points: Vec<Point> =
+            places.filter_map(|(dark, y)| Some(Point { x: dark.exposure_s?, y, weight: 1.0 })).collect();
+        let Some(line) = Line::through(points.clone()) else { return 0.0 };
+        let left = (line.chi_square(points) / freedom).sqrt();
+        missed * left.recip().min(MOST)
+    }
+
     fn weigh_response(&mut self) {
-        let freedom = self.response_points().count() as f64 - 1.0;
+        let parameters = if self.is_response_free { 2.0 } else { 1.0 };
+        let freedom = self.response_points().count() as f64 - parameters;
         if freedom < 0.0 {
             return;
         }
         let weights = |besides: f64, share: f64| -> Vec<f64> {
             let own = |&flat: &usize| {
                 let (point, signal) = (&self.flats[flat], self.signal(flat));
-                let scatter = point.mean.scatter() + self.scatter_beneath(flat)[0];
+                let of_black = if self.is_response_free { 0.0 } else { self.scatter_beneath(flat)[0] };
+                let scatter = point.mean.scatter() + of_black;
                 scatter + besides + (share + point.light_variance) * signal.powi(2)
             };
             self.fitted.iter().map(|flat| 1.0 / own(flat).max(f64::MIN_POSITIVE)).collect()
@@ -122,8 +145,7 @@ impl Curve {
         let misfit = |besides: f64, share: f64| {
             let response = weights(besides, share);
             let weighted = Self { weights: Weights { response, ..self.weights.clone() }, ..self.clone() };
-            let points: Vec<Point> = weighted.response_points().collect();
-            Line::through_zero(points.clone()).map_or(0.0, |line| line.chi_square(points))
+            weighted.response_line().map_or(0.0, |line| line.chi_square(weighted.response_points()))
         };
         let largest = self.fitted.iter().map(|&flat| self.signal(flat).powi(2)).fold(0.0, f64::max);
         let [besides, share] = if freedom > 0.0 {
@@ -136,7 +158,7 @@ impl Curve {
         self.light_error = share.sqrt();
         // What they miss it by is an error of the light: it tells nothing of the gain. It may be alike at all levels, or in proportion
         // to them, as that of a lamp that flickers; the larger counts, and it is known from few levels.
-        let Some(line) = Line::through_zero(self.response_points()) else { return };
+        let Some(line) = self.response_line() else { return };
         let few = few(freedom, self.confidence);
         for flat in 0..self.flats.len() {
             let signal = self.signal(flat);
@@ -157,7 +179,7 @@ fn off_line(misfit: f64, freedom: f64, besides: f64) -> Option<(String, bool)> {
     is_beyond.then(|| {
         let text = format!(
             "means of darks miss their line over exposure time by {} ADU more than their frames scatter by: the black level moves \
-             between them, or exposure times are wrong; intervals of dark current, black level and linearity take that in",
+             between them, exposure times are wrong, or the sensor was warmer for some; intervals of dark current, black level and linearity take that in",
             in_digits(besides.sqrt(), 3)
         );
         (text, true)
