@@ -139,7 +139,9 @@ impl Thousands {
         let mut found = columns.filter_map(|(place, column)| Some((place - 1, marked(column)?)));
         match by_rows {
             true => found.next().map_or(Points::Plain, |(_, number)| Points::Rows(number)),
-            false => Points::Columns(found.collect()),
+            false => Some(found.collect::<BTreeMap<_, _>>())
+                .filter(|columns| !columns.is_empty())
+                .map_or(Points::Plain, Points::Columns),
         }
     }
 
