@@ -66,6 +66,30 @@ fn marks_are_no_radiances() {
     }
 }
 
+/// That there are several spectra is told before their unit is asked for; that the first is none, before that.
+#[test]
+fn several_spectra_are_told_before_their_unit() {
+    let shop = Workshop::new();
+    let said = |text: &str, options: &str| {
+        fs::write(shop.path("t.csv"), text).unwrap();
+        String::from_utf8(shop.attempt(&format!("render-radiance t.csv{options} --size 4x4 -o a.exr"), &[]).stderr)
+            .unwrap()
+    };
+    let several = "t.csv: it holds 2 spectra, a, b; choose one with --column NAME or --sample N";
+    let numbers = "400,1,2\n700,2,1\n";
+    for heading in ["nm,a,b", "wavenumber (cm-1),a,b"] {
+        let numbers = if heading.starts_with("nm") { numbers } else { "14000,1,2\n25000,2,1\n" };
+        let found = said(&format!("{heading}\n{numbers}"), "");
+        assert!(found.contains(several), "{heading}: {found}");
+    }
+    let found = said(&format!("nm,a,b\n{numbers}"), " --column b");
+    assert!(found.contains("it does not say the unit of its radiance"), "{found}");
+    let found = said(&format!("nm,edir,uu\n{numbers}"), "");
+    assert!(found.contains("`edir`, an irradiance") && found.contains("`uu` may hold them"), "{found}");
+    let rows = said("# W m-2 sr-1 nm-1\nname,L_400,L_550,L_700\na,0.1,0.1,0.1\nb,0.2,0.1,0.1\n", "");
+    assert!(rows.contains(several), "{rows}");
+}
+
 /// The same light counted by wavelength, and by the energy of its photons per nm and per eV, of which 1 eV is λ²/1239.84 nm.
 #[test]
 fn energies_of_photons_are_the_wavelengths_that_they_have() {

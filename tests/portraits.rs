@@ -288,6 +288,29 @@ fn units_and_single_rows_have_the_panels_that_they_can_have() {
     assert_eq!((svg.matches(">G</text>").count(), svg.matches(&told).count()), (4, 1), "{told}");
 }
 
+/// Samples of which the first is farther from others than the largest single: all count, in mean, spread and correlations. Sums of
+/// doubles: 10⁻¹² of the range; correlations as of the same frame 2¹⁰⁰ times as small, but for what singles round.
+#[test]
+fn ranges_larger_than_any_single_are_shown() {
+    let value = |x: usize, y: usize| if (x + y).is_multiple_of(3) { f32::MAX } else { -0.75 * f32::MAX };
+    let of = |factor: f32| {
+        let head = header(QuantityKind::Unspecified, Geometry::new(12, 9, &["Y"]));
+        drawn(&frame(head, |x, y, _| factor * value(x, y)), &[])
+    };
+    let ((report, portrait), (_, small)) = (of(1.0), of(2.0_f32.powi(-100)));
+    let (group, small, channel) = (&portrait.groups[0], &small.groups[0], &report.regions[0].channels[0]);
+    let range = 2.0 * f64::from(f32::MAX);
+    assert!((group.mean().unwrap() - channel.mean.unwrap()).abs() < 1e-12 * range, "{:?}", group.mean());
+    // That of the report has one degree of freedom less.
+    let std = channel.std.unwrap() * (107.0_f64 / 108.0).sqrt();
+    assert!((group.std().unwrap() / std - 1.0).abs() < 1e-6, "{:?} {std}", group.std());
+    for axis in 0..2 {
+        for (one, wanted) in group.correlations[axis].iter().zip(&small.correlations[axis]) {
+            assert!((one.value.unwrap() - wanted.value.unwrap()).abs() < 1e-6, "{one:?} {wanted:?}");
+        }
+    }
+}
+
 /// Frames that have no histogram: uniform expected electrons, and one that is saturated throughout.
 #[test]
 fn a_figure_says_why_it_shows_nothing() {

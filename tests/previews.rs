@@ -279,6 +279,37 @@ fn captions_count_what_measure_counts() {
     }
 }
 
+/// A channel that is taken alone is called by its name below the picture and beside its bar, and layers as `measure` calls them.
+#[test]
+fn a_channel_alone_keeps_its_name() {
+    let shop = Workshop::with_frames();
+    for line in ["demosaic plane.exr --sigma -o s.exr", "to-xyz s.exr --matrix matrix.yaml --sigma -o sure.exr"] {
+        assert!(shop.attempt(line, &[]).status.success(), "{line}");
+    }
+    let tile = |name: &str, channel: &str, false_color: bool| {
+        let options =
+            InputOptions { path: Some(shop.path(name)), channel: Some(channel.to_owned()), ..InputOptions::default() };
+        let mut reader = FrameReader::open(&options).unwrap();
+        let channel = reader.taken_channel().map(str::to_owned);
+        let settings = PictureSettings {
+            channel,
+            false_color,
+            range: Some(Range::Shares(0.0, 1.0)),
+            ..PictureSettings::default()
+        };
+        thumbnail(&mut reader, &settings).unwrap()
+    };
+    for (name, channel, line) in
+        [("rgb.exr", "G", "G: mean "), ("xyz.exr", "x", "X: mean "), ("xyz.exr", "B", "Z: mean ")]
+    {
+        let caption = tile(name, channel, false).caption;
+        assert!(caption.iter().any(|said| said.starts_with(line)), "{name}: {caption:?}");
+    }
+    assert_eq!(tile("xyz.exr", "X", true).bar.unwrap().label, "X / cd m⁻²");
+    assert_eq!(tile("sure.exr", "sigma.Y", true).bar.unwrap().label, "standard deviation of Y / cd m⁻²");
+    assert!(tile("sure.exr", "sigma.Y", false).caption.iter().any(|said| said.starts_with("sigma.G: mean ")));
+}
+
 /// A plane of several units is told in its own; the range of color temperatures is one of their inverses, and never below 0.
 #[test]
 fn a_plane_is_told_in_its_own_unit() {

@@ -23,6 +23,7 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
             let meant = meant(&argument, command, words).map(|meant| format!("; did you mean `{meant}`?"));
             let hint = meant.unwrap_or(hint);
             let hint = output_hint(&argument, command, words).map_or(hint, |output| format!("; {output}"));
+            let hint = in_quotes(&argument, command, words).map_or(hint, |quoted| format!("; write {quoted}"));
             let argument = one_dash(&argument, words).unwrap_or(&argument);
             format!("unknown option or extra argument `{argument}`{hint}")
         }
@@ -66,6 +67,22 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
     };
     let joined = if problem.ends_with('?') { " See" } else { "; see" };
     format!("{problem}{joined} `{program} --help`")
+}
+
+/// An option with its value in quotes, where an argument too many is part of that: `--radiance-unit W m-2 sr-1 nm-1`.
+fn in_quotes(argument: &str, command: &Command, words: &[String]) -> Option<String> {
+    let place = words.iter().position(|word| word == argument)?;
+    let option = words.get(place.checked_sub(2)?).filter(|word| word.starts_with("--") && !word.contains('='))?;
+    let rest = words[place..].iter().take_while(|word| !word.starts_with('-'));
+    let value = std::iter::once(&words[place - 1]).chain(rest).map(String::as_str).collect::<Vec<_>>().join(" ");
+    let is_taken = |value: &str| {
+        let words = [String::new(), format!("{option}={value}")];
+        let refused = command.clone().try_get_matches_from(words).err();
+        !refused.is_some_and(|error| {
+            matches!(error.kind(), ErrorKind::InvalidValue | ErrorKind::ValueValidation | ErrorKind::UnknownArgument)
+        })
+    };
+    (is_taken(&value) && !is_taken("\u{1}")).then(|| format!("{option} '{value}'"))
 }
 
 /// A value that is none as it would be taken: with points for decimal commas, commas for semicolons between numbers, the letter x for
@@ -217,6 +234,8 @@ mod tests {
         for (line, wanted) in [
             ("--outptu a", "unknown option or extra argument `--outptu`; did you mean `--output`?"),
             ("a b --output c", "unknown option or extra argument `b`"),
+            ("--sides 3 x 4 --output c", "unknown option or extra argument `x`; write --sides '3 x 4'"),
+            ("--sides 3x4 a b --output c", "unknown option or extra argument `b`"),
             ("--output c -size 1", "unknown option or extra argument `-size`; did you mean `--size`?"),
             ("--output c -x", "unknown option or extra argument `-x`"),
             ("--output c --eci", "unknown option or extra argument `--eci`; did you mean `--method eci`?"),

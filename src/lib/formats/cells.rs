@@ -3,8 +3,9 @@
 use super::delimited::{self, Separator, decimal, number};
 use super::foreign::{csv_complaint, line_of};
 use super::keys;
-use super::thousands::Thousands;
+use super::thousands::{Points, Thousands};
 use crate::error::{Error, Result};
+use crate::units::WavelengthUnit;
 use csv::StringRecord;
 use flate2::read::GzDecoder;
 use ndarray::Array2;
@@ -39,6 +40,8 @@ pub(super) struct Cells {
     pub(super) labels: Vec<String>,
     /// The curves, from 0, that have a cell that is no number, and the complaint of the first of these.
     pub(super) spoiled: BTreeMap<usize, String>,
+    /// The curves whose points may be marks of thousands.
+    pub(super) points: Points,
 }
 
 impl Cells {
@@ -82,7 +85,11 @@ impl Cells {
                     // The label of a row need not be a number.
                     None if by_rows && column == 0 => 0.0,
                     None => {
-                        let what = if value.is_some() { fills(cell) } else { not_a_number(cell) };
+                        let what = match (value, column) {
+                            (Some(_), _) => fills(cell),
+                            (None, 0) => footer(cell).unwrap_or_else(|| not_a_number(cell)),
+                            (None, _) => not_a_number(cell),
+                        };
                         let problem = format!("line {}, column {}{what}", line(), column + 1);
                         let curve = if by_rows { Some(rows - 1) } else { column.checked_sub(1) };
                         let Some(curve) = curve.filter(|_| spoiled.len() < MAX_SPOILED) else {
@@ -103,7 +110,7 @@ impl Cells {
         let curves = if by_rows { rows } else { width.saturating_sub(1) };
         match spoiled.first_key_value() {
             Some((_, problem)) if spoiled.len() == curves => Err(refuse(problem.clone())),
-            _ => Ok(Self { numbers, labels, spoiled }),
+            _ => Ok(Self { numbers, labels, spoiled, points: thousands.points(separator, by_rows) }),
         }
     }
 }
@@ -120,7 +127,7 @@ impl Cells {
         }
         let numbers = self.numbers.slice(ndarray::s![.., 1..]).to_owned();
         let spoiled = self.spoiled.into_iter().map(|(curve, problem)| (curve - 1, problem)).collect();
-        Ok(Self { numbers, labels: self.labels, spoiled })
+        Ok(Self { numbers, labels: self.labels, spoiled, points: self.points.without_first() })
     }
 }
 
@@ -154,7 +161,7 @@ fn is_fill(value: f64) -> bool {
     /// Of NetCDF's floats people write as few digits as three.
     const NETCDF: f64 = 9.969_209_968_386_869e36;
     const ROUNDED: f64 = 2e-3;
-    const CHOSEN: [f64; 17] = [
+    const CHOSEN: [f64; 16] = [
         -99.0,
         -999.0,
         -9999.0,
@@ -164,22 +171,67 @@ fn is_fill(value: f64) -> bool {
         -999.9,
         -9999.9,
         -999.99,
+        // Above and below what an instrument detects, in files of ICARTT.
+        -7777.0,
+        -77_777.0,
+        -8888.0,
+        -88_888.0,
         -32_767.0,
         -32_768.0,
         -2_147_483_647.0,
-        1e15,
-        1e20,
-        1e30,
-        1e35,
-        1e36,
     ];
-    let is_chosen = CHOSEN.contains(&value) || CHOSEN[CHOSEN.len() - 5..].contains(&-value) || value == -1e34;
-    is_chosen || (value.abs() / NETCDF - 1.0).abs() < ROUNDED
+    /// Too large for any light, above zero or below.
+    const LARGE: [f64; 7] = [1e15, 1e20, 1e30, 1e31, 1e34, 1e35, 1e36];
+    let is_chosen = CHOSEN.contains(&value) || LARGE.contains(&-value) || LARGE.contains(&value) && value != 1e34;
+    let is_near = |large: f64| (value.abs() / large - 1.0).abs() < ROUNDED;
+    is_chosen || value == -1.23e34 || is_near(NETCDF) || is_near(f64::from(f32::MAX))
 }
 
 /// What is said of a cell with such a number.
 fn fills(cell: &str) -> String {
     format!(": `{cell}` marks a value that is missing; leave out its row, or fill it in")
+}
+
+/// What is said of the first cell of a row that is none of the table but a sum or a mean of it, or a note below it.
+fn footer(text: &str) -> Option<String> {
+    /// What people and spreadsheets call rows that are made of all others.
+    const TOTALS: [&str; 26] = [
+        "sum",
+        "total",
+        "subtotal",
+        "mean",
+        "average",
+        "avg",
+        "median",
+        "min",
+        "minimum",
+        "max",
+        "maximum",
+        "std",
+        "stdev",
+        "stddev",
+        "sd",
+        "count",
+        "integral",
+        "summe",
+        "gesamt",
+        "mittelwert",
+        "mittel",
+        "somme",
+        "moyenne",
+        "suma",
+        "media",
+        "ergebnis",
+    ];
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let shown: String = text.chars().take(20).collect();
+    let first = words.first()?.trim_end_matches([':', '.', '=']).to_lowercase();
+    if TOTALS.contains(&first.as_str()) {
+        return Some(format!(": `{shown}` is no number but a sum or a mean of other rows; leave out its row"));
+    }
+    // `400 nm` is a number with a mistake.
+    let is_note = words.len() > 1 && text.starts_with(char::is_alphabetic) || words.len() == 1 && text.ends_with(':');
+    is_note.then(|| format!(": `{shown}` is no number; put a # before its line if it is a note"))
 }
 
 /// What is wrong with a cell, and what to do where it stands for a value that is missing.
@@ -189,11 +241,53 @@ pub(super) fn not_a_number(text: &str) -> String {
     if let Some(said) = thousands(text) {
         return format!(": {said}");
     }
-    match MISSING.contains(&text.to_lowercase().as_str()) {
+    // `#DIV/0!`, `#WERT!`: errors of a spreadsheet.
+    let is_error = text.starts_with('#') && text.len() > 2;
+    match is_error || MISSING.contains(&text.to_lowercase().as_str()) {
         true => format!(": `{shown}` is no number; leave out the row of a missing value, or fill it in"),
+        false if text.split('|').filter(|part| numeric(part.trim()).is_some()).count() > 1 => {
+            format!(": `{shown}` is no number; commas, semicolons, tabs or blanks part cells, no `|`")
+        }
         false if text.is_empty() => " is empty; leave out the row of a missing value, or fill it in".into(),
-        false => format!(": `{shown}` is no number"),
+        false => {
+            format!(": `{shown}` is no number{}", as_meant(text).map_or(String::new(), |said| format!("; {said}")))
+        }
     }
+}
+
+/// What to write instead of a number as people print it; nothing where that is not plain.
+fn as_meant(text: &str) -> Option<String> {
+    /// What no number that people write is longer than.
+    const LONGEST: usize = 40;
+    if text.len() > LONGEST || !text.contains(|c: char| c.is_ascii_digit()) {
+        return None;
+    }
+    // Two cells that nothing parts are no number.
+    if text.split_whitespace().filter(|part| numeric(part).is_some()).count() > 1 {
+        return None;
+    }
+    // A minus or a power of ten as it is typeset.
+    let plain = text.replace(['−', '–'], "-").replace(char::is_whitespace, "");
+    let plain = ["x10^", "×10^", "*10^", "·10^"].into_iter().fold(plain, |text, power| text.replacen(power, "e", 1));
+    if numeric(&plain).is_some() {
+        return Some(format!("write {plain}"));
+    }
+    let is_number = |part: &str| numeric(part.trim()).is_some();
+    if text
+        .split_once('±')
+        .or_else(|| text.split_once("+-"))
+        .or_else(|| text.split_once("+/-"))
+        .is_some_and(|(a, _)| is_number(a))
+    {
+        return Some("write the number alone, and how sure it is in a column of its own".into());
+    }
+    if text.split_once(['-', '–']).is_some_and(|(from, to)| is_number(from) && is_number(to)) {
+        return Some("write the middle of an interval".into());
+    }
+    let unit = text.trim_start_matches(|c: char| c.is_ascii_digit() || ".,+-".contains(c));
+    let is_unit = matches!(WavelengthUnit::of_heading(unit.trim()), Ok(Some(_)));
+    let number = &text[..text.len() - unit.len()];
+    (is_unit && is_number(number)).then(|| format!("write {number}, and the unit in the heading"))
 }
 
 /// A table as text.
@@ -312,4 +406,81 @@ pub(super) fn unpacked<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>>
         ));
     }
     Ok(unpacked.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::formats::csv::SpectralTable;
+
+    fn complaint(text: &str) -> String {
+        SpectralTable::parse("t", text.as_bytes()).map_or_else(|error| error.to_string(), |_| "read".into())
+    }
+
+    #[test]
+    fn numbers_for_what_is_missing_are_told() {
+        for fill in
+            ["-7777", "-8888", "-8888.0", "-88888", "-1.23E34", "-1.23e+34", "-1e31", "-3.4028235e38", "3.40282e38"]
+        {
+            let wanted = format!(
+                "t: line 3, column 2: `{fill}` marks a value that is missing; leave out its row, or fill it in"
+            );
+            assert_eq!(complaint(&format!("nm,L\n400,0.5\n410,{fill}\n")), wanted);
+        }
+        for value in ["-777", "-888", "7777", "8888", "1.23e34", "1e34", "-7777.5"] {
+            assert_eq!(complaint(&format!("nm,L\n400,0.5\n410,{value}\n")), "read", "{value}");
+        }
+    }
+
+    #[test]
+    fn numbers_as_they_are_printed_are_told() {
+        for (cell, wanted) in [
+            ("−0.5", "; write -0.5"),
+            ("1.0 E-01", "; write 1.0E-01"),
+            ("1.0x10^-1", "; write 1.0e-1"),
+            ("1.2 × 10^-3", "; write 1.2e-3"),
+            ("0.5nm", "; write 0.5, and the unit in the heading"),
+            ("0.5±0.1", "; write the number alone, and how sure it is in a column of its own"),
+            ("0.4-0.6", "; write the middle of an interval"),
+            ("O.5", ""),
+            ("<0.5", ""),
+            ("0.5x", ""),
+            ("5OO", ""),
+            ("0.5 0.6", ""),
+        ] {
+            let wanted = format!("t: line 3, column 2: `{cell}` is no number{wanted}");
+            assert_eq!(complaint(&format!("nm,L\n400,0.5\n410,{cell}\n420,1\n")), wanted);
+        }
+    }
+
+    #[test]
+    fn what_stands_below_a_table_is_told() {
+        let total = "is no number but a sum or a mean of other rows; leave out its row";
+        let note = "is no number; put a # before its line if it is a note";
+        for (row, wanted) in [
+            ("Sum,0.5", format!("`Sum` {total}")),
+            ("Mean:,0.5", format!("`Mean:` {total}")),
+            ("Average of all,0.5", format!("`Average of all` {total}")),
+            ("Mittelwert,0.5", format!("`Mittelwert` {total}")),
+            ("Notes: by me,at noon", format!("`Notes: by me` {note}")),
+            ("Remark:,clear", format!("`Remark:` {note}")),
+            ("41O,0.5", "`41O` is no number".into()),
+            ("410 nm,0.5", "`410 nm` is no number; write 410, and the unit in the heading".into()),
+            ("#DIV/0!,0.5", "read".into()),
+        ] {
+            let found = complaint(&format!("nm,L\n400,0.5\n405,0.5\n{row}\n"));
+            let place = if wanted == "read" { String::new() } else { "t: line 4, column 1: ".into() };
+            assert_eq!(found, format!("{place}{wanted}"));
+        }
+        for error in ["#DIV/0!", "#WERT!", "#N/A"] {
+            let wanted = format!(
+                "t: line 3, column 2: `{error}` is no number; leave out the row of a missing value, or fill it in"
+            );
+            assert_eq!(complaint(&format!("nm,L\n400,0.5\n405,{error}\n")), wanted);
+        }
+        assert!(
+            complaint("nm|L\n400|0.5\n405|0.5\n").ends_with("commas, semicolons, tabs or blanks part cells, no `|`")
+        );
+        // A spectrum of a library may be called so.
+        assert_eq!(complaint("name,400,410\na,1,2\nMean,1,2\n"), "read");
+    }
 }

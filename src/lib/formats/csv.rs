@@ -13,11 +13,12 @@ use super::radiance_unit::{self, FileSays};
 use super::register;
 use super::remarks::{Comments, MAX_COMMENTS};
 use super::spectral_heading::{self, Wavelengths, check_first_column, is_behind_index, refuse_index, without_first};
+use super::thousands::Points;
 use super::uncertainties;
 use super::wavelengths::{check_nm, check_order, check_stated};
 use crate::error::{Error, Result};
 use crate::names::place_of;
-use crate::spectrum::{Along, Between, Curve, SHORTEST_NM};
+use crate::spectrum::{Along, Between, Curve};
 use crate::text::about;
 use crate::units::{OtherUnit, RadianceUnit, Stated, WavelengthUnit, unit_of_heading};
 use csv::StringRecord;
@@ -53,6 +54,9 @@ pub fn text_column(name: &str, bytes: &[u8], column: &str) -> Result<Vec<String>
     reader.records().map(|record| record.map(|row| row[place].to_owned()).map_err(not_csv)).collect()
 }
 
+/// So many times as bright as a white cloud in the sun a sky may be in places, near the sun.
+const BRIGHTEST: f64 = 100.0;
+
 /// Curves over common wavelengths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpectralTable {
@@ -75,6 +79,8 @@ pub struct SpectralTable {
     counted_in: WavelengthUnit,
     /// Whether nothing says what its columns are.
     is_bare: bool,
+    /// The curves whose points may be marks of thousands.
+    points: Points,
 }
 
 impl SpectralTable {
@@ -118,12 +124,13 @@ impl SpectralTable {
         if above_columns {
             check_first_column(name, &first)?;
         }
-        let Cells { numbers, labels, spoiled } = cells;
-        check_shape(name, &numbers, has_header)?;
+        let Cells { numbers, labels, spoiled, points } = cells;
+        misread::check_shape(name, &numbers, has_header)?;
         let width = numbers.ncols();
         let values = numbers.slice(ndarray::s![.., 1..]);
         let named_in_comment = if has_header { None } else { spectral_heading::in_comment(&text.decoded, width) };
         let unit_of_heads = heads.as_ref().and_then(|heads| heads.unit);
+        let of_heads = heads.as_ref().and_then(|heads| heads.quantity.clone());
         let (wavelengths, columns, values) = match heads {
             Some(heads) => (heads.values, labels, values.to_owned()),
             None => {
@@ -133,7 +140,8 @@ impl SpectralTable {
         };
         let comments = Comments::of(&text.decoded);
         doubt_of_factor(&text.decoded).into_iter().for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
-        let headings = headings(&columns, units.as_ref(), by_rows.then_some(&first[0]));
+        let of_rows = of_heads.or_else(|| unit_of_heading(&first[0]).filter(|_| by_rows));
+        let headings = headings(&columns, units.as_ref(), of_rows.as_ref());
         let heading = units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && !is_of_radiance(cell));
         let unit = match unit_of_heads {
             Some(unit) => Some(unit),
@@ -142,8 +150,9 @@ impl SpectralTable {
         if unit.is_none() && !by_rows {
             refuse_index(name, &numbers)?;
         }
-        let (wavelength_nm, values) =
-            in_nm(wavelengths, values, unit).map_err(|problem| Error::format(name, problem))?;
+        let are_swapped = || spectral_heading::are_swapped(&numbers).filter(|_| unit.is_none() && !by_rows);
+        let (wavelength_nm, values) = in_nm(wavelengths, values, unit)
+            .map_err(|problem| Error::format(name, are_swapped().unwrap_or(problem)))?;
         let counted_in = unit.unwrap_or(WavelengthUnit::Nanometer);
         let is_bare = !has_header && named_in_comment.is_none();
         let Comments { units: remarks, other_quantity, .. } = comments;
@@ -158,6 +167,7 @@ impl SpectralTable {
             other_quantity,
             counted_in,
             is_bare,
+            points,
         };
         Ok(table.without_uncertainties())
     }
@@ -172,6 +182,7 @@ impl SpectralTable {
             values: self.values.select(Axis(0), &kept),
             spoiled: self.spoiled.iter().filter_map(|(index, said)| Some((place(index)?, said.clone()))).collect(),
             headings: kept.iter().map(|index| self.headings[*index].clone()).collect(),
+            points: self.points.kept(&kept),
             ..self
         }
     }
@@ -218,7 +229,12 @@ impl SpectralTable {
         };
         exact.or_else(bare).or_else(counted).ok_or_else(|| {
             let some: Vec<&str> = self.columns.iter().take(8).map(String::as_str).collect();
-            Error::Usage(format!("{}: there is no column `{column}`; it has {}", self.name, some.join(", ")))
+            let all = self.columns.len();
+            let by_number = match column.parse::<usize>().is_ok_and(|place| (1..=all).contains(&place)) {
+                true => format!("; by its place it is column{column}"),
+                false => String::new(),
+            };
+            Error::Usage(format!("{}: there is no column `{column}`; it has {}{by_number}", self.name, some.join(", ")))
         })
     }
 
@@ -298,7 +314,9 @@ impl SpectralTable {
         }
         let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
         let (unit, assumed) = radiance_unit::settle(says, given)?;
-        let Some(times) = self.times_white(index, unit) else { return Ok((unit, assumed)) };
+        let times = self.times_white(index, unit);
+        self.points.check(&self.name, index, times)?;
+        let Some(times) = Some(times).filter(|times| *times > BRIGHTEST) else { return Ok((unit, assumed)) };
         let times = about(times, 2);
         let bright = format!("in {unit} it would be {times} times as bright as a white cloud in the sun");
         if assumed.is_some() && given.is_none() {
@@ -317,16 +335,13 @@ impl SpectralTable {
         likely.map(|(_, (column, _))| column.as_str()).collect()
     }
 
-    /// How many times as bright as a white cloud in the sun radiances are in a unit, where no sky is so bright.
-    fn times_white(&self, index: usize, unit: RadianceUnit) -> Option<f64> {
+    /// How many times as bright as a white cloud in the sun the brightest radiance is in a unit.
+    fn times_white(&self, index: usize, unit: RadianceUnit) -> f64 {
         /// Spectral radiance of what scatters all the light of the sun evenly, as the whitest cloud does, at its brightest, in
         /// W cm⁻² sr⁻¹ nm⁻¹: the extraterrestrial irradiance of \[ASTM E490], 2.1 W m⁻² nm⁻¹, over π.
         const WHITE: f64 = 6.7e-5;
-        /// So many times as bright a sky may be in places, near the sun.
-        const MOST: f64 = 100.0;
         let samples = self.values.row(index).into_iter().zip(&self.wavelength_nm);
-        let brightest = samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).fold(0.0, f64::max);
-        (brightest > MOST * WHITE).then_some(brightest / WHITE)
+        samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).fold(0.0, f64::max) / WHITE
     }
 
     /// The first column as the relative power of a light, per interval of wavelength.
@@ -377,33 +392,6 @@ fn first_record(name: &str, text: &Text, reader: &mut csv::Reader<&[u8]>) -> Res
     Ok(first)
 }
 
-/// Refuses numbers that are too few for a table, or rows of spectra without a heading that says so.
-fn check_shape(name: &str, numbers: &Array2<f64>, has_header: bool) -> Result<()> {
-    let refuse = |problem: &str| Err(Error::format(name, problem));
-    if numbers.ncols() < 2 || numbers.nrows() == 0 {
-        return refuse("it needs a column of wavelengths in nm and at least one of values");
-    }
-    if !has_header && holds_rows_without_names(numbers) {
-        return refuse(
-            "its first row holds wavelengths, and its rows are spectra without names; begin each with a name, and the first \
-             with a word, as in `name,400,410`",
-        );
-    }
-    Ok(())
-}
-
-/// Whether numbers without a heading are a row of wavelengths above spectra: the first goes one way and is that of wavelengths, the
-/// first of all others are not.
-fn holds_rows_without_names(numbers: &Array2<f64>) -> bool {
-    let (first, below) = (numbers.row(0), numbers.slice(ndarray::s![1.., 0]));
-    let ordered = |is_so: fn(&f64, &f64) -> bool| first.iter().zip(first.iter().skip(1)).all(|(a, b)| is_so(a, b));
-    first.len() > 2
-        && !below.is_empty()
-        && (ordered(|a, b| a < b) || ordered(|a, b| a > b))
-        && first.iter().all(|nm| *nm >= SHORTEST_NM)
-        && below.iter().all(|value| *value < SHORTEST_NM)
-}
-
 /// The record below the header, if there is one.
 fn record_below(name: &str, text: &str, reader: &mut csv::Reader<&[u8]>) -> Result<Option<StringRecord>> {
     let mut record = StringRecord::new();
@@ -420,8 +408,8 @@ fn heading_wavelengths(name: &str, text: &Text, heading: &StringRecord) -> Resul
 }
 
 /// What headings say about the unit of each curve: those of its column in a row of units and in the header; where curves are
-/// rows, those of the row and of the header's first cell.
-fn headings(columns: &[String], units: Option<&StringRecord>, corner: Option<&str>) -> Vec<Option<Stated>> {
+/// rows, that of the row, or what the header says `of_rows`.
+fn headings(columns: &[String], units: Option<&StringRecord>, of_rows: Option<&Stated>) -> Vec<Option<Stated>> {
     let unit_below = |index: usize, column: &str| {
         let cell = units?.get(index + 1)?;
         let both = unit_of_heading(&format!("{column} ({cell})"));
@@ -429,9 +417,8 @@ fn headings(columns: &[String], units: Option<&StringRecord>, corner: Option<&st
         let alone = || unit_of_heading(cell).or_else(|| unit_of_heading(&format!("({cell})")));
         if is_contradiction { both } else { alone() }
     };
-    let of_corner = corner.and_then(unit_of_heading);
     let one = |(index, column): (usize, &String)| {
-        unit_below(index, column).or_else(|| unit_of_heading(column)).or_else(|| of_corner.clone())
+        unit_below(index, column).or_else(|| unit_of_heading(column)).or_else(|| of_rows.cloned())
     };
     columns.iter().enumerate().map(one).collect()
 }
@@ -576,6 +563,9 @@ mod tests {
                 "  400,000  5,0e-01\n  410,000  1,25\n  420,000  3,0\n",
                 " WAVELENGTH (nm)   TOTAL RAD\n 400.  0.5D+00\n 410.  0.125D+01\n 420.  3.0D0\n",
                 "lambda [nm] L [W/(m2 sr nm)]\n400 0.5\n410 1.25\n420 3\n",
+                "wavelength (nm) spectral radiance (W m-2 sr-1 nm-1)\n400 0.5\n410 1.25\n420 3\n",
+                "wavelength nm\tradiance of sky\n400 0.5\n410 1.25\n420 3\n",
+                "wavelength (nm)   radiance (W m-2 sr-1 nm-1)\n400   0.5\n410 1.25\n420  3\n",
                 "# a, b\n; c; d\n% e\n// f\n! g\n  # h\n400 0.5\n\n410 1.25\n420 3\n",
                 "nm,L,\n400,0.5,\n410,1.25,\n420,3,\n,,\n",
                 "nm,\n400,0.5\n410,1.25\n420,3\n",

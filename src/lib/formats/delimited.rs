@@ -333,7 +333,7 @@ fn usual_width(text: &str, separator: Separator) -> usize {
 }
 
 /// Adds the cells of a line that are parted by blanks, tabs between them. Words are parted so that there are `width` of them:
-/// by two blanks or more, or each with what stands in brackets behind it; a row that begins with a number stays as it is where neither
+/// by two blanks or more, by tabs, each with what stands in brackets behind it, or several with such brackets; a row that begins with a number stays as it is where neither
 /// makes so many. Otherwise it gives how many there are.
 fn push_cells(plain: &mut String, line: &str, width: usize) -> std::result::Result<(), usize> {
     let cells: Vec<&str> = line.split_whitespace().collect();
@@ -342,14 +342,44 @@ fn push_cells(plain: &mut String, line: &str, width: usize) -> std::result::Resu
         plain.push_str(&cells.join("\t"));
         return Ok(());
     }
-    let apart: Vec<&str> = line.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).collect();
-    let named = bracketed(line);
+    let filled = |parts: &mut dyn Iterator<Item = &'_ str>| -> Vec<String> {
+        parts.map(|part| part.trim().to_owned()).filter(|cell| !cell.is_empty()).collect()
+    };
+    let apart = filled(&mut line.split("  "));
+    let by_tabs = filled(&mut line.split('\t'));
+    // `wavelength (nm) spectral radiance (W m-2 sr-1 nm-1)`
+    let behind_brackets = filled(&mut behind_brackets(line).into_iter());
+    let named = filled(&mut bracketed(line).into_iter());
     let count = cells.len();
     // No heading begins with a number.
-    let of_row = Some(cells).filter(|cells| Separator::Blanks.is_number(cells[0]));
-    let cells = [apart, named].into_iter().find(|cells| cells.len() == width).or(of_row).ok_or(count)?;
+    let of_row = Some(filled(&mut cells.into_iter())).filter(|cells| Separator::Blanks.is_number(&cells[0]));
+    let cells = [apart, by_tabs, named, behind_brackets]
+        .into_iter()
+        .find(|cells| cells.len() == width)
+        .or(of_row)
+        .ok_or(count)?;
     plain.push_str(&cells.join("\t"));
     Ok(())
+}
+
+/// The parts of a line of which each ends with brackets, where all do.
+fn behind_brackets(line: &str) -> Vec<&str> {
+    let (mut cells, mut begin, mut depth) = (Vec::new(), 0, 0_usize);
+    for (place, character) in line.char_indices() {
+        match character {
+            '(' | '[' => depth += 1,
+            ')' | ']' => {
+                depth = depth.saturating_sub(1);
+                let end = place + 1;
+                if depth == 0 && line[end..].chars().next().is_none_or(char::is_whitespace) {
+                    cells.push(&line[begin..end]);
+                    begin = end;
+                }
+            }
+            _ => {}
+        }
+    }
+    if line[begin..].trim().is_empty() { cells } else { Vec::new() }
 }
 
 /// The words of a line, each with what stands in brackets behind it.

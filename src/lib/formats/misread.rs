@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::spectrum::SHORTEST_NM;
 use crate::units::{WavelengthUnit, unit_of_heading};
 use csv::StringRecord;
+use ndarray::Array2;
 
 /// Columns that uvspec writes by default: the wavelength, edir, edn, eup, uavgdir, uavgdn, uavgup.
 pub(super) const UVSPEC: usize = 7;
@@ -90,6 +91,37 @@ pub(super) fn is_units(header: &StringRecord, record: &StringRecord) -> bool {
     record.iter().all(|cell| numeric(cell).is_none())
         && !matches!(WavelengthUnit::of_heading(record.get(place).unwrap_or_default()), Ok(None))
         && (header.get(place).is_some_and(names_wavelengths) || record.iter().skip(1).all(is_unit))
+}
+
+/// Refuses numbers that are too few for a table, or rows of spectra without a heading that says so.
+///
+/// # Errors
+///
+/// [`Error::Format`].
+pub(super) fn check_shape(name: &str, numbers: &Array2<f64>, has_header: bool) -> Result<()> {
+    let refuse = |problem: &str| Err(Error::format(name, problem));
+    if numbers.ncols() < 2 || numbers.nrows() == 0 {
+        return refuse("it needs a column of wavelengths in nm and at least one of values");
+    }
+    if !has_header && holds_rows_without_names(numbers) {
+        return refuse(
+            "its first row holds wavelengths, and its rows are spectra without names; begin each with a name, and the first \
+             with a word, as in `name,400,410`",
+        );
+    }
+    Ok(())
+}
+
+/// Whether numbers without a heading are a row of wavelengths above spectra: the first goes one way and is that of wavelengths, the
+/// first of all others are not.
+fn holds_rows_without_names(numbers: &Array2<f64>) -> bool {
+    let (first, below) = (numbers.row(0), numbers.slice(ndarray::s![1.., 0]));
+    let ordered = |is_so: fn(&f64, &f64) -> bool| first.iter().zip(first.iter().skip(1)).all(|(a, b)| is_so(a, b));
+    first.len() > 2
+        && !below.is_empty()
+        && (ordered(|a, b| a < b) || ordered(|a, b| a > b))
+        && first.iter().all(|nm| *nm >= SHORTEST_NM)
+        && below.iter().all(|value| *value < SHORTEST_NM)
 }
 
 /// What a text is that was read as no table, where that can be told.

@@ -1,11 +1,11 @@
-//! Headings of tables that are wavelengths, with or without words about them: `400`, `400nm`, `lambda_400`; and first columns that count
-//! rows.
+//! Headings of tables that are wavelengths, with or without words about them: `400`, `400nm`, `lambda_400`, `L_400`; and first columns
+//! that count rows.
 
 use super::cells::numeric;
 use super::delimited;
 use crate::error::{Error, Result};
 use crate::spectrum::SHORTEST_NM;
-use crate::units::WavelengthUnit;
+use crate::units::{Stated, WavelengthUnit, unit_of_heading};
 use csv::StringRecord;
 use ndarray::{Array2, ArrayView1};
 
@@ -18,7 +18,10 @@ pub(super) fn names_wavelengths(cell: &str) -> bool {
 
 /// Whether cells have two wavelengths, with words about them or without.
 pub(super) fn holds_wavelengths<'a>(cells: impl Iterator<Item = &'a str>) -> bool {
-    cells.map(str::trim).filter_map(|cell| Label::of(cell).or_else(|| Label::bare(cell))).nth(1).is_some()
+    let cells: Vec<&str> = cells.map(str::trim).collect();
+    let known = cells.iter().filter_map(|cell| Label::of(cell).or_else(|| Label::bare(cell)));
+    let behind: Vec<Label> = cells.iter().filter_map(|cell| Label::behind(cell)).collect();
+    known.count() > 1 || behind.windows(2).any(|pair| pair[0].is_alike(&pair[1]))
 }
 
 /// The wavelengths of a heading behind its first cell.
@@ -27,6 +30,8 @@ pub(super) struct Wavelengths {
     pub(super) values: Vec<f64>,
     /// Their unit, where each has it.
     pub(super) unit: Option<WavelengthUnit>,
+    /// The quantity that the word before them names, where that is no radiance: `reflectance_400nm`.
+    pub(super) quantity: Option<Stated>,
 }
 
 /// The wavelengths of a heading above rows of spectra, of which `below` is the first cell of the first; none of another heading.
@@ -37,15 +42,68 @@ pub(super) struct Wavelengths {
 pub(super) fn wavelengths(name: &str, line: u64, heading: &StringRecord, below: &str) -> Result<Option<Wavelengths>> {
     let numbers: Option<Vec<f64>> = heading.iter().skip(1).map(numeric).collect();
     if let Some(values) = numbers.filter(|values| values.len() > 1 && !are_names(&heading[0], values, below)) {
-        return Ok(Some(Wavelengths { values, unit: None }));
+        return Ok(Some(Wavelengths { values, unit: None, quantity: None }));
     }
     // Under a heading of wavelengths these stand below it.
-    let labels: Vec<Option<Label>> = heading.iter().map(|cell| Label::of(cell).or_else(|| Label::bare(cell))).collect();
-    let known = labels.iter().skip(1).flatten();
-    let Some(usual) = known.clone().next().filter(|_| !(names_wavelengths(&heading[0]) && numeric(below).is_some()))
-    else {
+    if names_wavelengths(&heading[0]) && numeric(below).is_some() {
         return Ok(None);
-    };
+    }
+    let labels: Vec<Option<Label>> = heading.iter().map(|cell| Label::of(cell).or_else(|| Label::bare(cell))).collect();
+    match among(name, line, heading, &labels)? {
+        Some((found, _)) => Ok(Some(found)),
+        None => behind_words(name, line, heading, below),
+    }
+}
+
+/// The wavelengths behind the symbol or name of a radiance, `L_400`, `Rad400`, above rows that begin with a name, or with a number that is no
+/// wavelength.
+///
+/// # Errors
+///
+/// As [`wavelengths`], and of what stands behind another word.
+fn behind_words(name: &str, line: u64, heading: &StringRecord, below: &str) -> Result<Option<Wavelengths>> {
+    /// What silicon sees.
+    const SEEN_NM: std::ops::RangeInclusive<f64> = 350.0..=1100.0;
+    /// What people call the column of names.
+    const NAMES: [&str; 10] = ["id", "name", "no", "nr", "sample", "site", "station", "spectrum", "point", "date"];
+    let corner = heading[0].trim_end_matches('.').to_lowercase();
+    // `1` may count rows; `0.4`, and what is light, may be a wavelength.
+    let begins_with_name = numeric(below).is_none_or(|value| value < 100.0 && value.fract() == 0.0);
+    if !begins_with_name && !NAMES.contains(&corner.as_str()) {
+        return Ok(None);
+    }
+    let labels: Vec<Option<Label>> = heading.iter().map(Label::behind).collect();
+    let Some((found, label)) = among(name, line, heading, &labels)? else { return Ok(None) };
+    if !found.values.iter().any(|nm| SEEN_NM.contains(nm)) {
+        return Ok(None);
+    }
+    if label.is_of_radiance() || found.quantity.is_some() {
+        return Ok(Some(found));
+    }
+    let nm = |place: usize| found.values.get(place).map_or_else(String::new, |nm| format!(",{nm}nm"));
+    let problem = format!(
+        "line {line}: its heading seems to hold wavelengths behind `{}`, which is no known name of a radiance; where the rows are spectra \
+         of radiance, write it as `name{}{},...`",
+        label.before,
+        nm(0),
+        nm(1)
+    );
+    Err(Error::format(name, problem))
+}
+
+/// The wavelengths of a heading of which most cells behind the first are such labels, and the first of these.
+///
+/// # Errors
+///
+/// [`Error::Format`] naming a cell that is none, or a heading without a name before them.
+fn among<'a>(
+    name: &str,
+    line: u64,
+    heading: &StringRecord,
+    labels: &'a [Option<Label>],
+) -> Result<Option<(Wavelengths, &'a Label)>> {
+    let known = labels.iter().skip(1).flatten();
+    let Some(usual) = known.clone().next() else { return Ok(None) };
     let is_alike = |label: &Option<Label>| label.as_ref().is_some_and(|label| label.is_alike(usual));
     let like: Vec<f64> = known.filter(|label| label.is_alike(usual)).map(|label| label.value).collect();
     if like.len() < 2 || !goes_one_way(&like) || 3 * like.len() < 2 * (heading.len() - 1) {
@@ -54,8 +112,7 @@ pub(super) fn wavelengths(name: &str, line: u64, heading: &StringRecord, below: 
     let refuse = |problem: String| Err(Error::format(name, problem));
     if let Some(column) = (1..heading.len()).find(|column| !is_alike(&labels[*column])) {
         let shown = &heading[column];
-        let others =
-            heading.iter().zip(&labels).skip(1).find(|(_, label)| is_alike(label)).map_or("", |(cell, _)| cell);
+        let others = heading.iter().zip(labels).skip(1).find(|(_, label)| is_alike(label)).map_or("", |(cell, _)| cell);
         return refuse(format!(
             "line {line}, column {}: `{shown}` is no wavelength as the others are, such as `{others}`; mend it, or leave the column out: \
              one name stands before the values of each row",
@@ -69,7 +126,9 @@ pub(super) fn wavelengths(name: &str, line: u64, heading: &StringRecord, below: 
                 .into(),
         );
     }
-    Ok(Some(Wavelengths { values: like, unit: usual.unit }))
+    let is_other = |stated: &Stated| matches!(stated, Stated::Other { kind, .. } if kind.conversion().is_some());
+    let quantity = unit_of_heading(&usual.before).filter(is_other);
+    Ok(Some((Wavelengths { values: like, unit: usual.unit, quantity }, usual)))
 }
 
 /// Whether numbers rise throughout, or fall.
@@ -110,12 +169,8 @@ impl Label {
         const WORDS: [&str; 8] = ["wavelength", "wave", "lambda", "λ", "wl", "wvl", "nm", "x"];
         /// Beyond this no radiance is measured by wavelength.
         const LONGEST_NM: f64 = 1e5;
-        let begin = cell.find(|c: char| c.is_ascii_digit())?;
-        let is_mark = |c: char| c.is_whitespace() || "_-.:=([".contains(c);
-        let before = cell[..begin].trim_matches(is_mark).to_lowercase();
-        let length = cell[begin..].find(|c: char| !(c.is_ascii_digit() || ".,".contains(c)));
-        let (number, behind) = cell[begin..].split_at(length.unwrap_or(cell.len() - begin));
-        let behind = behind.trim_start_matches('_').trim_end_matches([')', ']']).trim();
+        let [before, number, behind] = Self::parts(cell)?;
+        let before = before.to_lowercase();
         let value = numeric(number)?;
         let unit = if behind.is_empty() { None } else { Some(WavelengthUnit::of_heading(behind).ok()??) };
         let nm = unit.unwrap_or(WavelengthUnit::Nanometer).nm(value);
@@ -123,10 +178,41 @@ impl Label {
         (is_named && (SHORTEST_NM..=LONGEST_NM).contains(&nm)).then_some(Self { before, value, unit })
     }
 
+    /// What stands before the first number of a cell, without marks, the number, and what stands behind it.
+    fn parts(cell: &str) -> Option<[&str; 3]> {
+        let begin = cell.find(|c: char| c.is_ascii_digit())?;
+        let is_mark = |c: char| c.is_whitespace() || "_-.:=([".contains(c);
+        let length = cell[begin..].find(|c: char| !(c.is_ascii_digit() || ".,".contains(c)));
+        let (number, behind) = cell[begin..].split_at(length.unwrap_or(cell.len() - begin));
+        let behind = behind.trim_start_matches('_').trim_end_matches([')', ']']).trim();
+        Some([cell[..begin].trim_matches(is_mark), number, behind])
+    }
+
+    /// That of a cell which ends with a number behind some word, as in `L_400`.
+    fn behind(cell: &str) -> Option<Self> {
+        let [before, number, behind] = Self::parts(cell)?;
+        let value = numeric(number).filter(|nm| Self::SEEN_NM.contains(nm))?;
+        (behind.is_empty() && before.starts_with(char::is_alphabetic)).then(|| Self {
+            before: before.to_lowercase(),
+            value,
+            unit: None,
+        })
+    }
+
+    /// Whether the last word before the number is that of a radiance.
+    fn is_of_radiance(&self) -> bool {
+        /// Names, and symbols of oceanographers: total, sky, upwelling, water-leaving.
+        const RADIANCES: [&str; 11] = ["l", "rad", "radiance", "radiances", "le", "lt", "li", "ls", "lsky", "lu", "lw"];
+        let last = self.before.rsplit(|c: char| !c.is_alphanumeric()).next();
+        last.is_some_and(|word| RADIANCES.contains(&word))
+    }
+
+    /// Beyond these no radiance is measured by wavelength where no unit says so.
+    const SEEN_NM: std::ops::RangeInclusive<f64> = 200.0..=5000.0;
+
     /// That of a cell which holds a wavelength and nothing else, beside others that do.
     fn bare(cell: &str) -> Option<Self> {
-        const SEEN_NM: std::ops::RangeInclusive<f64> = 200.0..=5000.0;
-        let value = numeric(cell).filter(|nm| SEEN_NM.contains(nm))?;
+        let value = numeric(cell).filter(|nm| Self::SEEN_NM.contains(nm))?;
         Some(Self { before: String::new(), value, unit: None })
     }
 
@@ -204,6 +290,19 @@ pub(super) fn refuse_index(name: &str, numbers: &Array2<f64>) -> Result<()> {
     ))
 }
 
+/// What is said of numbers whose first column holds no wavelengths of light and of which another does; nothing of others.
+pub(super) fn are_swapped(numbers: &Array2<f64>) -> Option<String> {
+    /// What a camera sees, with room.
+    const SEEN_NM: std::ops::RangeInclusive<f64> = 200.0..=5000.0;
+    let is_light = |column: ArrayView1<f64>| {
+        let values = column.to_vec();
+        values.len() > 1 && goes_one_way(&values) && values.iter().all(|nm| SEEN_NM.contains(nm))
+    };
+    let is_dark = numbers.column(0).iter().all(|nm| *nm < SHORTEST_NM);
+    let place = (1..numbers.ncols()).find(|place| is_light(numbers.column(*place))).filter(|_| is_dark)?;
+    Some(format!("its wavelengths seem to stand in column {}; they must be the first column", place + 1))
+}
+
 /// The names behind that of the wavelengths in the comment next above the rows of a table without a heading, where it has one for each of
 /// its `width` columns, as libRadtran and Python's `savetxt` write headings.
 pub(super) fn in_comment(text: &str, width: usize) -> Option<StringRecord> {
@@ -252,6 +351,14 @@ mod tests {
             "name;400,0nm;500,0nm;600,0nm\na;1;2;3\nb;4;5;6\n",
             "name,600nm,500nm,400nm\na,3,2,1\nb,6,5,4\n",
             "name 400nm 500nm 600nm\na 1 2 3\nb 4 5 6\n",
+            "name,L_400,L_500,L_600\na,1,2,3\nb,4,5,6\n",
+            "name;L400;L500;L600\na;1,0;2,0;3,0\nb;4,0;5,0;6,0\n",
+            "name L400 L500 L600\na 1 2 3\nb 4 5 6\n",
+            ",Rad_400,Rad_500,Rad_600\na,1,2,3\nb,4,5,6\n",
+            "name,Rad_400nm,Rad_500nm,Rad_600nm\na,1,2,3\nb,4,5,6\n",
+            "id,sky_L_400,sky_L_500,sky_L_600\n1,1,2,3\n2,4,5,6\n",
+            "site,radiance(600),radiance(500),radiance(400)\n412,3,2,1\n413,6,5,4\n",
+            "wavelength,L400,L500,L600\na,1,2,3\nb,4,5,6\n",
         ] {
             let table = SpectralTable::parse("t", format!("{UNIT}\n{text}").as_bytes())
                 .unwrap_or_else(|error| panic!("{text}: {error}"));
@@ -269,9 +376,37 @@ mod tests {
         assert_eq!((excited.columns[0].as_str(), excited.wavelength_nm.len()), ("ex350nm", 2));
     }
 
+    /// Where wavelengths stand in the first column, `L400` is the name of a curve.
+    #[test]
+    fn numbers_behind_words_are_wavelengths_where_nothing_else_is() {
+        for (text, columns) in [
+            ("wavelength,L400,L500\n400,1,2\n500,3,4\n", "L400 L500"),
+            ("x,L_400,L_500,L_600\n400,1,2,3\n500,3,4,5\n", "L_400 L_500 L_600"),
+            (",sky401,sky402\n400,1,2\n500,3,4\n", "sky401 sky402"),
+            ("name,L1,L2,L3\n400,1,2,3\n500,3,4,5\n", "L1 L2 L3"),
+        ] {
+            let table = SpectralTable::parse("t", text.as_bytes()).unwrap_or_else(|error| panic!("{text}: {error}"));
+            assert_eq!((table.columns.join(" ").as_str(), table.wavelength_nm), (columns, vec![400.0, 500.0]));
+        }
+        let wanted = "t: line 1: its heading seems to hold wavelengths behind `ch`, which is no known name of a radiance; where the rows are \
+                      spectra of radiance, write it as `name,400nm,500nm,...`";
+        assert_eq!(complaint("time,ch400,ch500\n12:00,1,2\n13:00,1,2\n"), wanted);
+        // Years and places are told as what they were.
+        assert!(!complaint("name,sky2019,sky2020\na,1,2\nb,1,2\n").contains("wavelengths behind"));
+        for heading in ["name,reflectance_400,reflectance_500", "name,Reflectance 400nm,Reflectance 500nm"] {
+            let table = SpectralTable::parse("t", format!("{UNIT}\n{heading}\na,1,2\n").as_bytes()).unwrap();
+            let refused = table.radiance_unit(0, None).unwrap_err().to_string();
+            assert!(refused.contains("a ratio, not the radiance itself"), "{heading}: {refused}");
+        }
+    }
+
     #[test]
     fn headings_that_are_wavelengths_but_for_some_are_told() {
         for (text, wanted) in [
+            (
+                "name,sza,L400,L500,L600,L700\nz,50.7,1,2,3,4\n",
+                "line 1, column 2: `sza` is no wavelength as the others are, such as `L400`",
+            ),
             (
                 "name,400nm,5O0nm,600nm,700nm\na,1,2,3,4\n",
                 "line 1, column 3: `5O0nm` is no wavelength as the others are, such as `400nm`",
@@ -336,6 +471,12 @@ mod tests {
             ("id,wavelength,L\n7,400,1\n3,500,2\n9,600,3\n", "t: its wavelengths, `wavelength`, stand in column 2"),
             ("time,wavelength,L\n12:00,400,1\n12:00,500,2\n", "t: its wavelengths, `wavelength`, stand in column 2"),
             ("wavelength,a,wavelength,b\n400,1,400,2\n500,2,500,3\n", "t: its columns 1 and 3 both name wavelengths"),
+            (
+                "0.1,400\n0.12,500\n0.1,700\n",
+                "t: its wavelengths seem to stand in column 2; they must be the first column",
+            ),
+            ("L,x\n0.1,700\n0.12,500\n", "t: its wavelengths seem to stand in column 2; they must be the first column"),
+            ("um,L\n0.4,400\n0.4,500\n", "t: the wavelength 400 nm stands there twice"),
             ("No.,wavelength,L\n1,4O0,1\n2,500,2\n3,600,3\n", "t: line 2, column 2: `4O0` is no number"),
         ] {
             assert!(complaint(text).starts_with(wanted), "{text}: {}", complaint(text));

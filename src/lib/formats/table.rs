@@ -26,6 +26,8 @@ pub const FORMATS: &[FrameFormat] = &[
     unread::IIQ,
     png::FORMAT,
     unread::JPEG,
+    unread::PNM,
+    unread::HDR,
     fits::FORMAT,
     tiff::FORMAT,
 ];
@@ -182,6 +184,10 @@ mod tests {
         // What is read is told from the others too, and says itself what is wrong.
         assert!(complaint(b"\x89PNG\r\n\x1A\n\0\0\0\rIHDR").contains("it was cut short"));
         assert!(complaint(&[0xFF, 0xD8, 0xFF, 0xE0]).starts_with("in: it is a JPEG, which is not read yet; "));
+        assert!(
+            complaint(b"P5\n2 2\n65535\nabcdefgh").starts_with("in: it is a PNM (PGM, PPM), which is not read yet; ")
+        );
+        assert!(complaint(b"#?RADIANCE\n").starts_with("in: it is a Radiance HDR, which is not read yet; "));
         assert!(complaint(b"SIMPLE  =                    T").contains("ends within a header"));
     }
 

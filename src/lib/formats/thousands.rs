@@ -1,7 +1,8 @@
-//! Marks of thousands where they look like those of decimals: `51,309`, `1.000`.
+//! Marks of thousands where they look like those of decimals: `51,309`, `1.000`, `51.309`.
 
 use super::delimited::{decimal, number};
 use crate::error::{Error, Result};
+use std::collections::BTreeMap;
 
 /// What the numbers of one column of a table look like.
 #[derive(Debug, Clone, Default)]
@@ -20,6 +21,72 @@ pub(super) struct Thousands {
     columns: Vec<Column>,
     /// Whether some comma can be that of decimals alone, so that all are.
     has_decimal_commas: bool,
+    /// The same of points.
+    has_decimal_points: bool,
+}
+
+/// Numbers whose points may be marks of thousands, one of each curve.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) enum Points {
+    /// None.
+    #[default]
+    Plain,
+    /// In columns, by the place of the curve.
+    Columns(BTreeMap<usize, (String, u64)>),
+    /// In rows, each a curve.
+    Rows((String, u64)),
+}
+
+impl Points {
+    /// That of a curve.
+    fn of(&self, curve: usize) -> Option<&(String, u64)> {
+        match self {
+            Self::Plain => None,
+            Self::Columns(columns) => columns.get(&curve),
+            Self::Rows(number) => Some(number),
+        }
+    }
+
+    /// The same without the first curve.
+    pub(super) fn without_first(self) -> Self {
+        match self {
+            Self::Columns(columns) => {
+                let others = columns.into_iter().filter_map(|(curve, number)| Some((curve.checked_sub(1)?, number)));
+                Self::Columns(others.collect())
+            }
+            other => other,
+        }
+    }
+
+    /// The same of the curves that are kept.
+    pub(super) fn kept(self, kept: &[usize]) -> Self {
+        match self {
+            Self::Columns(columns) => {
+                let place = |curve: usize| kept.iter().position(|kept| *kept == curve);
+                let kept = columns.into_iter().filter_map(|(curve, number)| Some((place(curve)?, number)));
+                Self::Columns(kept.collect())
+            }
+            other => other,
+        }
+    }
+
+    /// Refuses a curve of such numbers, `times_white` as bright as a white cloud in the sun at its brightest: a thousand times as bright
+    /// it may still be light of the sky.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] naming a number.
+    pub(super) fn check(&self, name: &str, curve: usize, times_white: f64) -> Result<()> {
+        /// No sky is so many times as bright but near the sun.
+        const MOST: f64 = 10.0;
+        let Some((cell, line)) = self.of(curve).filter(|_| 1000.0 * times_white <= MOST) else { return Ok(()) };
+        let problem = format!(
+            "line {line}: nobody can tell whether the point of `{cell}` is that of thousands or of decimals, beside semicolons and with \
+             three digits behind every point; write {} or {cell}0, and so all numbers",
+            cell.replace('.', "")
+        );
+        Err(Error::format(name, problem))
+    }
 }
 
 impl Thousands {
@@ -29,7 +96,11 @@ impl Thousands {
             self.columns.resize(column + 1, Column::default());
         }
         let known = &mut self.columns[column];
-        if known.has_other && (self.has_decimal_commas || !cell.contains(',')) {
+        let is_settled = match cell.contains(',') {
+            true => self.has_decimal_commas,
+            false => self.has_decimal_points || !cell.contains('.'),
+        };
+        if known.has_other && is_settled {
             return;
         }
         let unsigned = cell.strip_prefix(['+', '-']).unwrap_or(cell);
@@ -41,13 +112,36 @@ impl Thousands {
                 } else {
                     known.has_other = true;
                     self.has_decimal_commas |= cell.contains(',');
+                    self.has_decimal_points |= cell.contains('.');
                 }
             }
             None if are_digits(unsigned) && unsigned.len() == 3 => {
                 known.plain.get_or_insert_with(|| cell.to_owned());
             }
             None if are_digits(unsigned) && unsigned.len() < 3 => {}
-            _ => known.has_other |= number(cell).or_else(|| decimal(cell)).is_some(),
+            _ => {
+                let is_number = number(cell).or_else(|| decimal(cell)).is_some();
+                known.has_other |= is_number;
+                // `5.1e-3`
+                self.has_decimal_points |= is_number && cell.contains('.');
+            }
+        }
+    }
+
+    /// The curves of a table whose points may be marks of thousands: between semicolons, which people put where commas are those of
+    /// decimals and points those of thousands, where no number of the table has a point that can be that of decimals alone.
+    pub(super) fn points(self, separator: char, by_rows: bool) -> Points {
+        if separator != ';' || self.has_decimal_points {
+            return Points::Plain;
+        }
+        let marked = |column: Column| column.marked.filter(|(cell, _)| cell.contains('.') && !column.has_other);
+        let columns = self.columns.into_iter().enumerate().skip(1);
+        let mut found = columns.filter_map(|(place, column)| Some((place - 1, marked(column)?)));
+        match by_rows {
+            true => found.next().map_or(Points::Plain, |(_, number)| Points::Rows(number)),
+            false => Some(found.collect::<BTreeMap<_, _>>())
+                .filter(|columns| !columns.is_empty())
+                .map_or(Points::Plain, Points::Columns),
         }
     }
 
@@ -115,6 +209,45 @@ mod tests {
             "nm,L\n400.125,1\n400.25,2\n401,3\n",
         ] {
             assert_eq!(complaint(text), "read", "{text}");
+        }
+    }
+
+    /// In one unit a sky may be a thousand times as bright, in another nothing is.
+    #[test]
+    fn points_between_semicolons_are_told_where_both_may_be() {
+        let unit = |text: &str, unit: &str| {
+            let table = SpectralTable::parse("t", text.as_bytes()).unwrap_or_else(|error| panic!("{text}: {error}"));
+            let last = table.columns.len() - 1;
+            table
+                .radiance_unit(last, crate::units::RadianceUnit::parse(unit))
+                .map(drop)
+                .map_err(|error| error.to_string())
+        };
+        let dim = "nW cm-2 sr-1 nm-1";
+        for text in [
+            "nm;L\n350;51.309\n600;12.345\n",
+            "nm;M;L\n350;1;51.309\n600;2;12.345\n",
+            "No.;nm;L\n1;350;51.309\n2;600;12.345\n3;700;7\n",
+            "id;350;600\na;51.309;12.345\n",
+            "nm;std;L\n350;1;51.309\n600;2;12.345\n",
+        ] {
+            let refused = unit(text, dim).unwrap_err();
+            let wanted = "nobody can tell whether the point of `51.309` is that of thousands or of decimals";
+            assert!(refused.starts_with("t: line 2: ") && refused.contains(wanted), "{text}: {refused}");
+            // 51 W m-2 sr-1 nm-1 are 760 times a white cloud.
+            assert_eq!(unit(text, "mW m-2 sr-1 nm-1"), Ok(()), "{text}");
+        }
+        for text in [
+            "nm;L\n350;51.309\n600;0.345\n",
+            "nm;L\n350;51.309\n600;12.34\n",
+            "nm;L\n350.5;51.309\n600.5;12.345\n",
+            "nm;L\n350.0;51.309\n600.0;12.345\n",
+            "nm;L\n350;51.309\n600;1.2e1\n",
+            "nm;L\n350;51,309\n600;12,345\n",
+            "nm,L\n350,51.309\n600,12.345\n",
+            "nm L\n350 51.309\n600 12.345\n",
+        ] {
+            assert_eq!(unit(text, dim), Ok(()), "{text}");
         }
     }
 }

@@ -55,6 +55,19 @@ pub const JPEG: FrameFormat = FrameFormat {
     ),
 };
 
+/// Portable pictures, as `dcraw` writes them.
+pub const PNM: FrameFormat = FrameFormat {
+    name: "a PNM (PGM, PPM)",
+    sign: Sign::Bytes(|head| matches!(head, [b'P', b'1'..=b'6', b'\n' | b'\r', ..])),
+    reading: Reading::NotYet("convert it, for example with `oiiotool in.pgm -o out.tif`, which keeps 16 bits"),
+};
+/// Pictures of Radiance.
+pub const HDR: FrameFormat = FrameFormat {
+    name: "a Radiance HDR",
+    sign: Sign::Bytes(|head| head.starts_with(b"#?RADIANCE") || head.starts_with(b"#?RGBE")),
+    reading: Reading::NotYet("convert it, for example with `oiiotool in.hdr -o out.exr`"),
+};
+
 /// Compressions of their own: Sony's, Nikon's and Pentax's.
 const OWN_COMPRESSIONS: [u64; 3] = [32_767, 34_713, 65_535];
 

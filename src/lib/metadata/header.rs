@@ -26,7 +26,11 @@ impl FrameHeader {
     /// What reports call a channel: its own name, but X where XYZ is stored as R, G, B, and the like (TIFF has no other
     /// names).
     pub fn channel_name(&self, index: usize) -> &str {
-        let name = self.geometry.channels[index].as_str();
+        self.name_of(&self.geometry.channels[index])
+    }
+
+    /// The same of a channel by the name that it is stored by.
+    pub fn name_of<'a>(&self, name: &'a str) -> &'a str {
         let [first, second, third] = match self.metadata.quantity {
             QuantityKind::Xyz => ["X", "Y", "Z"],
             QuantityKind::Xyy => ["x", "y", "Y"],

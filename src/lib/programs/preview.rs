@@ -50,6 +50,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
                 session.report_reader(&reader);
                 settings.caption.is_some().then(|| reader.keep_mask());
                 let place = session.place(reader.header(), output)?.path.unwrap_or_default();
+                let settings = picture.settings_of(&reader);
                 write_picture(&mut reader, &settings, &place)?;
                 session.tell(&requests::of_marks(&reader));
                 Ok(())
@@ -63,6 +64,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
         let mut reader = picture.open(&input)?;
         session.report_reader(&reader);
         reader.keep_mask();
+        let settings = picture.settings_of(&reader);
         tiles.push(thumbnail(&mut reader, &settings)?);
         session.tell(&requests::of_marks(&reader));
     }

@@ -74,7 +74,7 @@ pub struct PictureOptions {
     /// Rectangle X,Y,W,H in pixels to show; by default the whole frame
     #[arg(long, value_name = "X,Y,W,H", value_parser = values::region)]
     region: Option<Region>,
-    /// Show one plane alone: a channel or a layer by the name that `measure` gives it, such as Y of XYZ or sigma.Y, or a class
+    /// Show one plane alone: a channel or a layer by the name that `measure` gives it, such as Y of XYZ, or sigma.Y for its standard deviation, or a class
     /// of a CFA plane, R, G or B, by the means of its photosites in each period of the array
     #[arg(long, value_name = "NAME", conflicts_with = "channel")]
     plane: Option<String>,
@@ -142,10 +142,15 @@ impl PictureOptions {
         if self.plane.is_some() { input.open_all() } else { input.open() }
     }
 
-    /// What is to be shown.
+    /// What is to be shown, of any frame.
     pub fn settings(&self) -> PictureSettings {
         let Self { region, plane, false_color, zoom, fit, range, caption } = self.clone();
-        PictureSettings { region, zoom, fit, plane, false_color, range, caption }
+        PictureSettings { region, zoom, fit, plane, false_color, range, caption, channel: None }
+    }
+
+    /// What is to be shown of a frame that is open.
+    pub fn settings_of(&self, reader: &FrameReader) -> PictureSettings {
+        PictureSettings { channel: reader.taken_channel().map(str::to_owned), ..self.settings() }
     }
 }
 

@@ -28,8 +28,8 @@ impl Along {
 /// Wavelengths so close that a spectrum is all but straight in nm between them, each a mixture of two samples.
 ///
 /// Between samples farther apart than 2 nm all whole nanometers that are 1 nm from them or more are put in. What bends as λ⁻³
-/// (straight in wavenumber, and per wavenumber) is off by no more than (2/λ)²·12/8 of itself beside a sample, 4·10⁻⁵ at 400 nm, and
-/// exact where sums by 1 nm look otherwise.
+/// (straight in wavenumber, and per wavenumber) is off by no more than (3/λ)²·12/8 of itself between samples less than 3 nm apart, where
+/// none may be put in, 8·10⁻⁵ at 400 nm, and exact where sums by 1 nm look otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Between {
     /// Wavelengths in nm, ascending.
@@ -122,5 +122,22 @@ mod tests {
         let values = bent.values(|index| rows[index]);
         assert!(values.iter().zip(&bent.wavelength_nm).all(|(value, nm)| (value / nm - 1.0).abs() < 1e-12));
         assert_eq!(bent.wavelength_nm.len(), 3 + 99 + 1500);
+    }
+
+    /// Between samples that are too close to a whole nanometer straight lines in nm stay: at most (3/λ)²·12/8 of what bends as λ⁻³.
+    #[test]
+    fn what_is_left_of_straight_lines_is_small() {
+        for step in [20, 80, 100, 200, 1000] {
+            let rows: Vec<f64> = (12_000..=25_000).rev().step_by(step).map(|per_cm| 1e7 / f64::from(per_cm)).collect();
+            let between = Between::new(&rows, Along::Wavenumber, true);
+            let nm = &between.wavelength_nm;
+            let (mut worst, value) = (0.0_f64, |nm: f64| nm.powi(-3));
+            for pair in nm.windows(2) {
+                let middle = 0.5 * (pair[0] + pair[1]);
+                let line = 0.5 * (value(pair[0]) + value(pair[1]));
+                worst = worst.max(line / value(middle) - 1.0);
+            }
+            assert!(worst < 1.5 * (3.0_f64 / 400.0).powi(2), "{step} cm-1: {worst}");
+        }
     }
 }

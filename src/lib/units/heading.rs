@@ -487,6 +487,9 @@ mod tests {
             ("L (100 W/(m² sr nm))", "100 W/(m² sr nm)"),
             ("radiance lm/(m2 sr nm)", "lm/(m2 sr nm)"),
             ("L (cd/(m2 nm))", "cd/(m2 nm)"),
+            ("L (W/m2xy nm)", "W/m2xy nm"),
+            ("radiance W/m2sr1nm/s", "W/m2sr1nm/s"),
+            ("L [W/(m2xy nm)]", "W/(m2xy nm)"),
         ] {
             assert!(
                 matches!(unit_of_heading(heading), Some(Stated::Other { text, .. }) if text == written),

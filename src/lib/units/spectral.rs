@@ -205,11 +205,26 @@ pub(super) struct Found {
 }
 
 impl Found {
+    /// Where it ends with what it is divided by, of which a piece may be none that is known: `W/m2xy nm`.
+    fn whole(&self, tokens: &[Token]) -> usize {
+        let is_part = |token: &Token| match token {
+            Token::Factor { word, .. } => base(word).is_some(),
+            token => *token == Token::Per,
+        };
+        match tokens.get(self.end) {
+            Some(Token::End) if tokens[self.end - 1] == Token::Per => {
+                let behind = &tokens[self.end + 1..];
+                self.end + 1 + behind.iter().take_while(|token| is_part(token)).count()
+            }
+            _ => self.end,
+        }
+    }
+
     /// What it says, another unit than of radiance as it is written in a text of these pieces.
     pub(super) fn written_in(&self, text: &str, tokens: &[Token]) -> Stated {
         match &self.says {
             Stated::Other { kind, text: plain } => {
-                let written = as_written(text, &tokens[self.begin..self.end]).unwrap_or(plain);
+                let written = as_written(text, &tokens[self.begin..self.whole(tokens)]).unwrap_or(plain);
                 Stated::Other { text: written.to_owned(), kind: *kind }
             }
             radiance => radiance.clone(),
@@ -426,7 +441,7 @@ mod tests {
     use crate::units::heading::unit_of_heading;
 
     /// Spellings, and what one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
-    const RADIANCES: [(&str, f64); 76] = [
+    const RADIANCES: [(&str, f64); 82] = [
         ("W cm-2 sr-1 nm-1", 1.0),
         ("W m-2 sr-1 nm-1", 1e-4),
         ("W.m^-2.sr^-1.nm^-1", 1e-4),
@@ -440,6 +455,12 @@ mod tests {
         ("W/m²/sr/nm", 1e-4),
         ("W/m2-sr-nm", 1e-4),
         ("W/m2 sr nm", 1e-4),
+        ("W/m2sr nm", 1e-4),
+        ("W/(m²sr nm)", 1e-4),
+        ("mW/m²sr·nm", 1e-7),
+        ("W/cm2sr um", 1e-3),
+        ("W/m2nm sr", 1e-4),
+        ("W m^-2 sr^-1 nm ^-1", 1e-4),
         ("W m-2 sr-1/nm", 1e-4),
         ("(W/m2)/(sr nm)", 1e-4),
         ("sr-1 nm-1 m-2 W", 1e-4),

@@ -125,7 +125,7 @@ impl Token {
 pub(super) fn tokens(text: &str) -> Vec<Token> {
     let mut plain = String::with_capacity(text.len());
     // Powers of ten are numbers, `10^-3` as `1e-3`.
-    let text = text.replace("10^", "1e").replace("10**", "1e").replace("**", "");
+    let text = text.replace(" ^", "^").replace("10^", "1e").replace("10**", "1e").replace("**", "");
     let mut characters = text.chars().peekable();
     while let Some(character) = characters.next() {
         match character {
@@ -201,7 +201,20 @@ fn pieces(word: &str) -> Vec<Token> {
             }
         }
     }
-    parts.iter().filter(|part| !part.is_empty()).flat_map(|part| glued(piece(part))).collect()
+    let parts = parts.iter().filter(|part| !part.is_empty());
+    parts.flat_map(|part| by_powers(part).unwrap_or_else(|| glued(piece(part)))).collect()
+}
+
+/// The factors of a word in which a power stands between two, `m2sr`, where all are known.
+fn by_powers(word: &str) -> Option<Vec<Token>> {
+    let behind_power =
+        |(at, pair): (usize, &[u8])| (pair[0].is_ascii_digit() && pair[1].is_ascii_alphabetic()).then_some(at + 1);
+    let mut cuts = word.as_bytes().windows(2).enumerate().filter_map(behind_power);
+    let (cut, is_last) = (cuts.next()?, cuts.next().is_none());
+    let (first, second) = word.split_at(cut);
+    let factors = [first, second].map(piece);
+    let is_known = |token: &Token| matches!(token, Token::Factor { word, .. } if base(word).is_some());
+    (is_last && factors.iter().all(is_known)).then(|| factors.to_vec())
 }
 
 /// A power and a length in one word, `Wm-2`, as two factors; another piece as it is.

@@ -112,7 +112,7 @@ fn unit(frame: &FrameHeader) -> String {
     }
 }
 
-/// Sums over pairs of deviations.
+/// Sums over pairs of halves of deviations.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Pairs {
     count: u64,
@@ -121,7 +121,7 @@ struct Pairs {
     product: f64,
 }
 
-/// Samples of one group in one row, as deviations, NaN where they do not count.
+/// Samples of one group in one row, as halves of deviations, NaN where they do not count.
 #[derive(Debug, Clone)]
 struct Line {
     group: usize,
@@ -356,15 +356,16 @@ impl Likeness {
     /// Mean of the samples seen.
     pub fn mean(&self) -> Option<f64> {
         let Pairs { count, first, .. } = self.deviations;
-        self.center.filter(|_| count > 0).map(|center| center + first / count as f64)
+        self.center.filter(|_| count > 0).map(|center| center + 2.0 * first / count as f64)
     }
 
     /// Standard deviation of the samples seen.
     pub fn std(&self) -> Option<f64> {
-        (self.deviations.count > 1).then(|| self.deviations.covariance().max(0.0).sqrt())
+        (self.deviations.count > 1).then(|| 2.0 * self.deviations.covariance().max(0.0).sqrt())
     }
 
-    /// Takes in samples of row `y`, whose columns are `offset` and every `stride` from there on, and gives their deviations.
+    /// Takes in samples of row `y`, whose columns are `offset` and every `stride` from there on, and gives the halves of
+    /// their deviations, which no sample makes too large for one.
     fn take(&mut self, samples: &[f32], y: usize, offset: usize, stride: usize) -> Vec<f32> {
         let finite = || samples.iter().copied().filter(|sample| sample.is_finite());
         self.center = self.center.or_else(|| finite().next().map(f64::from));
@@ -376,7 +377,7 @@ impl Likeness {
             rows.add(y, f64::from(*sample));
         }
         let deviations: Vec<f32> =
-            samples.iter().map(|sample| crate::frame::to_sample(f64::from(*sample) - center)).collect();
+            samples.iter().map(|sample| crate::frame::to_sample(0.5 * (f64::from(*sample) - center))).collect();
         self.deviations.add(&deviations, &deviations);
         deviations
     }

@@ -1,5 +1,6 @@
 //! What is kept of a frame: its channels, and a rectangle.
 
+use super::options::InputOptions;
 use crate::analysis::statistics::Region;
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, THREE_PLANES};
@@ -11,41 +12,53 @@ use crate::units::QuantityKind;
 /// What the names of layers of standard deviations begin with.
 const SIGMA: &str = "sigma.";
 
-/// One channel alone, as the plane Y, and its place among those that are stored; by the name that reports give it, or that it is
-/// stored by.
-///
-/// # Errors
-///
-/// [`Error::Usage`] where there is no such channel.
-pub(super) fn take_channel(
-    stored: &Geometry,
-    channel: &str,
-    name: &str,
-    quantity: QuantityKind,
-) -> Result<(usize, Geometry)> {
-    let frame = FrameHeader { name: name.to_owned(), geometry: stored.clone(), metadata: Metadata::new(quantity) };
-    let called = |place: usize| match stored.channels[place].strip_prefix(SIGMA) {
-        Some(base) => {
-            let of = stored.channels.iter().position(|known| known == base);
-            format!("{SIGMA}{}", of.map_or(base, |of| frame.channel_name(of)))
-        }
-        None => frame.channel_name(place).to_owned(),
-    };
-    let names: Vec<String> = (0..stored.channels.len()).map(called).collect();
-    let named = place_of(channel, names.iter().map(String::as_str));
-    let Some(place) = named.or_else(|| place_of(channel, stored.channels.iter().map(String::as_str))) else {
-        let mut some = names.iter().take(8).map(String::as_str).collect::<Vec<_>>().join(", ");
-        if names.len() > 8 {
-            some += ", …";
-        }
-        let problem = format!("{name}: there is no channel `{channel}`; it has {some}");
-        return Err(Error::Usage(problem).change(&["channel"]));
-    };
-    Ok((place, stored.with_channels(&["Y"])))
+/// The channels that are kept.
+pub(super) struct Taken {
+    /// The place of the first among those that are stored.
+    pub(super) place: usize,
+    /// What reports call the one that is taken alone, as the plane Y.
+    pub(super) called: Option<String>,
+    pub(super) geometry: Geometry,
+}
+
+impl Taken {
+    /// The channel that the options name, of whose unit the metadata are then, or those that stages work on.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where there is no such channel.
+    pub(super) fn of(stored: &Geometry, options: &InputOptions, name: &str, metadata: &mut Metadata) -> Result<Self> {
+        let Some(channel) = &options.channel else {
+            let geometry = keep_planes(stored, options.all_channels, metadata.quantity);
+            return Ok(Self { place: 0, called: None, geometry });
+        };
+        let taken = Self::one(stored, channel, name, metadata.quantity)?;
+        metadata.unit = unit_of(stored, taken.place, &metadata.unit);
+        Ok(taken)
+    }
+
+    /// That of a name: the one that reports give it, or that it is stored by; a layer of standard deviations also by that of what these are
+    /// of, `sigma.X`.
+    fn one(stored: &Geometry, channel: &str, name: &str, quantity: QuantityKind) -> Result<Self> {
+        let frame = FrameHeader { name: name.to_owned(), geometry: stored.clone(), metadata: Metadata::new(quantity) };
+        let names: Vec<&str> = (0..stored.channels.len()).map(|place| frame.channel_name(place)).collect();
+        let layer = |stored: &String| stored.strip_prefix(SIGMA).map(|base| format!("{SIGMA}{}", frame.name_of(base)));
+        let layers: Vec<String> = stored.channels.iter().map(|stored| layer(stored).unwrap_or_default()).collect();
+        let place = place_of(channel, names.iter().copied())
+            .or_else(|| place_of(channel, layers.iter().map(String::as_str)))
+            .or_else(|| place_of(channel, stored.channels.iter().map(String::as_str)));
+        let Some(place) = place else {
+            let some = names.iter().take(8).copied().collect::<Vec<_>>().join(", ");
+            let more = if names.len() > 8 { ", …" } else { "" };
+            let problem = format!("{name}: there is no channel `{channel}`; it has {some}{more}");
+            return Err(Error::Usage(problem).change(&["channel"]));
+        };
+        Ok(Self { place, called: Some(names[place].to_owned()), geometry: stored.with_channels(&["Y"]) })
+    }
 }
 
 /// The unit of one channel, or of its standard deviation, of a frame whose channels may have one each.
-pub(super) fn unit_of(stored: &Geometry, place: usize, unit: &str) -> String {
+fn unit_of(stored: &Geometry, place: usize, unit: &str) -> String {
     let channel = &stored.channels[place];
     let base = channel.strip_prefix(SIGMA).unwrap_or(channel);
     let units: Vec<&str> = unit.split(", ").collect();
@@ -72,7 +85,7 @@ pub(super) fn cut(header: &mut FrameHeader, crop: Region) -> Result<[usize; 2]> 
 }
 
 /// The channels that stages work on: the first three where they are R, G, B; Y alone; otherwise all.
-pub(super) fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry {
+fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry {
     let mut kept = stored.clone();
     let starts =
         |names: &[&str]| stored.channels.len() > names.len() && stored.channels.iter().zip(names).all(|(a, b)| a == b);

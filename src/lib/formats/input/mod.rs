@@ -15,7 +15,7 @@ pub use options::{InputOptions, Linearizing, OfCamera};
 
 use self::checks::Checks;
 use self::described::DigestCheck;
-use self::kept::{LEFT_OUT, cut, keep_planes, left_out, take_channel};
+use self::kept::{LEFT_OUT, Taken, cut, left_out};
 use self::metadata::{Found, doubt_of_marks, find_metadata, placed, take_scaling};
 use self::opening::{head_of, is_file, of_upstream, open_piped, open_seekable, open_unseekable, readers_of};
 use super::digest::SamplesDigest;
@@ -90,6 +90,8 @@ pub struct FrameReader {
     marked: [u64; MASK_BITS.len()],
     /// The first channel that is kept; the others follow it.
     first_channel: usize,
+    /// What reports call the channel that was taken alone.
+    called: Option<String>,
     /// Column and row of the stored frame that are kept first.
     corner: [usize; 2],
     has_begun: bool,
@@ -196,14 +198,7 @@ impl FrameReader {
         camera::describe(&mut metadata, &place, &options.camera)?;
         let scaling = take_scaling(reader.as_ref(), &mut metadata, &place, name)?;
         let origin = placed(reader.as_ref(), metadata.origin.take(), &place, name)?;
-        let (first_channel, geometry) = match &options.channel {
-            Some(channel) => {
-                let (place, geometry) = take_channel(stored, channel, name, metadata.quantity)?;
-                metadata.unit = kept::unit_of(stored, place, &metadata.unit);
-                (place, geometry)
-            }
-            None => (0, keep_planes(stored, options.all_channels, metadata.quantity)),
-        };
+        let Taken { place: first_channel, called, geometry } = Taken::of(stored, options, name, &mut metadata)?;
         let left_out = match &options.channel {
             Some(_) => &[][..],
             None => &stored.channels[geometry.channels.len()..],
@@ -252,11 +247,17 @@ impl FrameReader {
             keeps_mask: false,
             marked: [0; MASK_BITS.len()],
             first_channel,
+            called,
             corner,
             has_begun: false,
             sequence: None,
             to_come,
         })
+    }
+
+    /// What reports call the channel that was taken alone, as the plane Y.
+    pub fn taken_channel(&self) -> Option<&str> {
+        self.called.as_deref()
     }
 
     /// Metadata to amend before a stage is built on them.
@@ -697,7 +698,7 @@ mod tests {
         let channel = Some("G".to_owned());
         let options = InputOptions { path, channel, ..InputOptions::default() };
         let (reader, samples) = read(&options).unwrap();
-        assert_eq!(reader.header().geometry.channels, ["Y"]);
+        assert_eq!((reader.header().geometry.channels.join(" ").as_str(), reader.taken_channel()), ("Y", Some("G")));
         assert_eq!((samples.len(), samples[0], samples[41], reader.mismatch()), (42, 10.0, 516.0, None));
         let (_, samples) = read(&InputOptions { crop: Some(CROP), ..options.clone() }).unwrap();
         assert_eq!(samples, [312.0, 313.0, 314.0, 315.0, 412.0, 413.0, 414.0, 415.0]);
@@ -739,7 +740,7 @@ mod tests {
             assert_eq!(taken(channel).unwrap(), first, "{channel}");
         }
         let complaint = taken("W").unwrap_err().to_string();
-        assert!(complaint.contains("it has X, Y, Z, sigma.X, sigma.Y, sigma.Z;"), "{complaint}");
+        assert!(complaint.contains("it has X, Y, Z, sigma.R, sigma.G, sigma.B;"), "{complaint}");
     }
 
     #[test]

@@ -47,6 +47,8 @@ pub struct PictureSettings {
     pub range: Option<Range>,
     /// Whether what is seen is said below the picture: in these words, or, where they are empty, by what the frame holds.
     pub caption: Option<String>,
+    /// What reports call the single channel of a frame that was taken from others.
+    pub channel: Option<String>,
 }
 
 /// Reads a frame and writes it as a PNG.
@@ -125,6 +127,7 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
         settings.false_color = true;
         Choice::leading(&frame)
     };
+    let choice = Choice { called: settings.channel.clone(), ..choice };
     let reduction = reduction(&frame, &settings, &choice)?;
     let region = settings.region.unwrap_or(Region::whole(&frame));
     let mut tally = Tally::new(&frame, &source, region, &choice);
@@ -166,7 +169,7 @@ const THUMBNAIL: usize = 320;
 fn seen(name: &str, moments: &Moments) -> String {
     match moments.std(0) {
         Some(std) => {
-            format!("{name}: mean {}, std {}", planes::rounded(moments.mean[0]), planes::rounded(std))
+            format!("{name}: mean {}, std {}", planes::mean_beside(moments.mean[0], std), planes::rounded(std))
         }
         None if moments.count == 1 => format!("{name}: {}", planes::rounded(moments.mean[0])),
         None => format!("{name}: no number"),
@@ -193,6 +196,7 @@ impl Shown {
             true => Choice::leading(&frame),
             false => Choice::of(&frame, settings.plane.as_deref(), settings.false_color)?,
         };
+        let choice = Choice { called: settings.channel.clone(), ..choice };
         let reduction = reduction(&frame, &settings, &choice)?;
         let reduced = Reduced::read(source, &reduction, &choice, None)?;
         if !reduced.has_numbers() {

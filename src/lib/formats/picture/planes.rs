@@ -16,6 +16,8 @@ pub(super) struct Choice {
     pub channels: Vec<usize>,
     /// The letter of the filter whose photosites alone are shown.
     pub filter: Option<char>,
+    /// What reports call the single channel of a frame that was taken from others.
+    pub called: Option<String>,
 }
 
 impl Choice {
@@ -27,7 +29,7 @@ impl Choice {
     /// [`Error::Usage`] for a name that is none of the frame's, which are listed; [`Error::Format`] for what makes no picture.
     pub fn of(frame: &FrameHeader, name: Option<&str>, is_one: bool) -> Result<Self> {
         let channels = &frame.geometry.channels;
-        let all = |channels: &[usize]| Self { channels: channels.to_vec(), filter: None };
+        let all = |channels: &[usize]| Self { channels: channels.to_vec(), filter: None, called: None };
         let Some(name) = name else {
             return match channels.len() {
                 1 => Ok(all(&[0])),
@@ -50,10 +52,11 @@ impl Choice {
         let filters = filters(frame);
         let letters: Vec<String> = filters.iter().map(char::to_string).collect();
         if let Some(place) = place_of(name, letters.iter().map(String::as_str)) {
-            return Ok(Self { channels: vec![0], filter: Some(filters[place]) });
+            return Ok(Self { channels: vec![0], filter: Some(filters[place]), called: None });
         }
-        let names: Vec<String> = (0..channels.len()).map(|place| plane_name(frame, place)).collect();
-        let place = place_of(name, names.iter().map(String::as_str))
+        let names: Vec<String> = channels.iter().map(|channel| in_words(frame, channel)).collect();
+        let place = place_of(name, (0..channels.len()).map(|place| frame.channel_name(place)))
+            .or_else(|| place_of(name, names.iter().map(String::as_str)))
             .or_else(|| place_of(name, channels.iter().map(String::as_str)));
         place
             .map(|place| all(&[place]))
@@ -62,12 +65,12 @@ impl Choice {
 
     /// The plane that says most of a frame, for one that is no picture as it is: its luminance or lightness, or the first.
     pub fn leading(frame: &FrameHeader) -> Self {
-        let place = |name: &str| (0..frame.geometry.channels.len()).find(|place| plane_name(frame, *place) == name);
+        let place = |name: &str| (0..frame.geometry.channels.len()).find(|place| frame.channel_name(*place) == name);
         let place = match frame.metadata.quantity {
             QuantityKind::Cct => place("CCT"),
             _ => place("Y").or_else(|| place("L")),
         };
-        Self { channels: vec![place.unwrap_or(0)], filter: None }
+        Self { channels: vec![place.unwrap_or(0)], filter: None, called: None }
     }
 
     /// Whether a frame is a map of quantities, of which the first is looked for and no color is made.
@@ -77,7 +80,10 @@ impl Choice {
 
     /// What reports call the channels that are shown.
     pub fn names(&self, frame: &FrameHeader) -> Vec<String> {
-        self.channels.iter().map(|place| plane_name(frame, *place)).collect()
+        match &self.called {
+            Some(called) => vec![called.clone()],
+            None => self.channels.iter().map(|place| frame.channel_name(*place).to_owned()).collect(),
+        }
     }
 
     /// The letters of the filters whose photosites are shown, of a CFA plane.
@@ -107,7 +113,8 @@ impl Choice {
     /// What stands beside the scale of a single plane: the quantity and its unit.
     pub fn label(&self, frame: &FrameHeader) -> String {
         let [place] = self.channels[..] else { return typeset(&frame.metadata.unit) };
-        let quantity = match (quantity(frame, place), self.filter) {
+        let channel = self.called.as_ref().unwrap_or(&frame.geometry.channels[place]);
+        let quantity = match (quantity(frame, channel), self.filter) {
             (words, None) => words,
             (words, Some(filter)) => format!("{words}, class {filter}"),
         };
@@ -131,17 +138,17 @@ fn known(frame: &FrameHeader) -> String {
     const SHOWN: usize = 16;
     let channels = 0..frame.geometry.channels.len();
     let classes = filters(frame).into_iter().map(String::from);
-    let names: Vec<String> = channels.map(|place| plane_name(frame, place)).chain(classes).take(SHOWN + 1).collect();
+    let names: Vec<String> =
+        channels.map(|place| frame.channel_name(place).to_owned()).chain(classes).take(SHOWN + 1).collect();
     let more = if names.len() > SHOWN { ", …" } else { "" };
     names[..names.len().min(SHOWN)].join(", ") + more
 }
 
-/// What a channel is called, a layer by what it belongs to: `sigma.Y` where file have `sigma.G`.
-fn plane_name(frame: &FrameHeader, place: usize) -> String {
-    let channel = &frame.geometry.channels[place];
+/// What a channel is called, a layer by what it belongs to: `sigma.Y` where files and reports have `sigma.G`.
+fn in_words(frame: &FrameHeader, channel: &str) -> String {
     match channel.strip_prefix(SIGMA) {
-        Some(base) => format!("{SIGMA}{}", base_name(frame, base)),
-        None => frame.channel_name(place).to_owned(),
+        Some(base) => format!("{SIGMA}{}", frame.name_of(base)),
+        None => frame.name_of(channel).to_owned(),
     }
 }
 
@@ -150,16 +157,9 @@ const SIGMA: &str = "sigma.";
 /// What begins the name of a layer of covariances.
 const COVARIANCE: &str = "covariance.";
 
-/// What reports call the channel that a layer belongs to.
-fn base_name<'a>(frame: &'a FrameHeader, base: &'a str) -> &'a str {
-    let place = frame.geometry.channels.iter().position(|channel| channel == base);
-    place.map_or(base, |place| frame.channel_name(place))
-}
-
 /// What the numbers of a channel are, in words.
-fn quantity(frame: &FrameHeader, place: usize) -> String {
-    let channel = &frame.geometry.channels[place];
-    let name = plane_name(frame, place);
+fn quantity(frame: &FrameHeader, channel: &str) -> String {
+    let name = in_words(frame, channel);
     if let Some(base) = name.strip_prefix(SIGMA) {
         return format!("standard deviation of {base}");
     }
@@ -170,7 +170,7 @@ fn quantity(frame: &FrameHeader, place: usize) -> String {
         return "mask, sum of bits".into();
     }
     let formulas = ["ΔE2000", "ΔE*ab", "ΔE94", "ΔE*ab in JND"];
-    if let Some(formula) = MAP_CHANNELS.iter().position(|formula| formula == channel) {
+    if let Some(formula) = MAP_CHANNELS.iter().position(|formula| *formula == channel) {
         return formulas[formula].into();
     }
     match frame.metadata.quantity {
@@ -182,7 +182,8 @@ fn quantity(frame: &FrameHeader, place: usize) -> String {
                 QuantityKind::Adu => "codes".to_owned(),
                 other => other.to_string(),
             };
-            if frame.geometry.channels.len() == 1 { words } else { format!("{words}, {name}") }
+            let is_only = frame.geometry.channels.first().is_some_and(|only| only == channel);
+            if frame.geometry.channels.len() == 1 && is_only { words } else { format!("{words}, {name}") }
         }
         QuantityKind::Unspecified => format!("samples {name}"),
         QuantityKind::Lab | QuantityKind::Luv if name != "mask" => format!("{name}*"),
@@ -246,16 +247,44 @@ pub(super) fn level(value: f64) -> String {
 
 /// A number in five digits.
 pub(super) fn rounded(value: f64) -> String {
-    const DIGITS: i32 = 5;
+    in_digits(value, DIGITS)
+}
+
+const DIGITS: i32 = 5;
+
+/// The mean of samples in five digits, or in as many as two digits of their standard deviation have; of samples that are all the same, as
+/// many as tell it from others.
+pub(super) fn mean_beside(mean: f64, std: f64) -> String {
+    /// Beyond these a double has none.
+    const MOST: i32 = 15;
+    if std == 0.0 {
+        let five = rounded(mean);
+        #[expect(clippy::cast_possible_truncation, reason = "samples are singles")]
+        let shortest = (mean as f32).to_string().replace('-', "−");
+        let is_longer = shortest.len() > five.len() && !five.contains('e');
+        return if is_longer { shortest } else { five };
+    }
+    let below = magnitude(mean).saturating_sub(magnitude(std));
+    in_digits(mean, below.saturating_add(2).clamp(DIGITS, MOST))
+}
+
+/// The power of ten that a number begins with; of 0 the least.
+fn magnitude(value: f64) -> i32 {
+    #[expect(clippy::cast_possible_truncation, reason = "logarithms of doubles are within ±324")]
+    let magnitude = value.abs().log10().floor().max(-400.0) as i32;
+    magnitude
+}
+
+fn in_digits(value: f64, digits: i32) -> String {
     if value == 0.0 {
         return "0".into();
     }
-    #[expect(clippy::cast_possible_truncation, reason = "logarithms of doubles are within ±324")]
-    let magnitude = value.abs().log10().floor() as i32;
+    let magnitude = magnitude(value);
+    let behind_point = |first: i32| usize::try_from(digits - 1 - first).unwrap_or(0);
     if (-4..7).contains(&magnitude) {
-        format!("{value:.*}", usize::try_from(DIGITS - 1 - magnitude).unwrap_or(0)).replace('-', "−")
+        format!("{value:.*}", behind_point(magnitude)).replace('-', "−")
     } else {
-        format!("{value:.4e}").replace('-', "−")
+        format!("{value:.*e}", behind_point(0)).replace('-', "−")
     }
 }
 
@@ -289,7 +318,7 @@ mod tests {
             assert_eq!(find(&xyz, name).unwrap(), (place, None), "{name}");
         }
         let complaint = find(&xyz, "sigma").unwrap_err().to_string();
-        assert_eq!(complaint, "f: there is no plane `sigma`; it has X, Y, Z, covariance.XX, sigma.X, sigma.Y, mask");
+        assert_eq!(complaint, "f: there is no plane `sigma`; it has X, Y, Z, covariance.XX, sigma.R, sigma.G, mask");
         let mut plane = frame(QuantityKind::Adu, &["Y"]);
         plane.metadata.cfa = Some("rggb".parse().unwrap());
         assert_eq!(find(&plane, "G").unwrap(), (0, Some('G')));
@@ -327,6 +356,20 @@ mod tests {
             [(4095.0, "4095"), (1757.31, "1757.3"), (-0.5, "−0.5"), (40_000.0, "40000"), (1e9, "1.0000e9")]
         {
             assert_eq!(level(number), wanted);
+        }
+        for (mean, std, wanted) in [
+            (1234.55, 0.028_856, "1234.550"),
+            (1234.55, 0.5, "1234.55"),
+            (1234.55, 20.0, "1234.6"),
+            (0.001_2, 3.0, "0.0012000"),
+            (0.0, 3.0, "0"),
+            (-40_000.012_5, 0.001, "−40000.0125"),
+            (3.0e8, 12.0, "3.00000000e8"),
+            (f64::from(1234.56_f32), 0.0, "1234.56"),
+            (100.0, 0.0, "100.00"),
+            (1e9, 0.0, "1.0000e9"),
+        ] {
+            assert_eq!(mean_beside(mean, std), wanted);
         }
         assert_eq!(apart(5000.12, 5000.14, level), ["5000.12", "5000.14"]);
         assert_eq!(apart(1757.31, 4095.0, level), ["1757.3", "4095"]);

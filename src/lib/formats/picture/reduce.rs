@@ -212,7 +212,7 @@ impl Tally {
     /// Nothing seen yet of what is shown.
     pub fn new(frame: &FrameHeader, rows: &MarkedRows, region: Region, choice: &Choice) -> Self {
         let filters = choice.filters(frame);
-        let of_class = |filter: &char| Choice { channels: vec![0], filter: Some(*filter) };
+        let of_class = |filter: &char| Choice { channels: vec![0], filter: Some(*filter), called: None };
         let classes = filters.iter().map(|filter| Seen::of(frame, region, &of_class(filter))).collect();
         let full = FullLevels::of(frame).filter(|_| samples_tell(frame)).map(|levels| levels.classes());
         let level = |place: Option<usize>| full.and_then(|levels| levels.get(place?).copied());

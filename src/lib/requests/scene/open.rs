@@ -184,10 +184,13 @@ impl Scene {
             (None, None) if count == 1 => Ok(0),
             (None, None) => {
                 const SHOWN: usize = 8;
-                // What holds no radiances is told first.
-                table
-                    .radiance_unit(0, self.spectrum.radiance_unit)
-                    .map_err(|error| beside(error, &table.columns[0], &table.likely_radiances()))?;
+                // What holds no radiances is told first; a unit is asked for of the one that is chosen.
+                let (first, likely) = (table.columns[0].as_str(), table.likely_radiances());
+                if !likely.contains(&first) {
+                    table
+                        .radiance_unit(0, self.spectrum.radiance_unit)
+                        .map_err(|error| beside(error, first, &likely))?;
+                }
                 let names: Vec<&str> = table.columns.iter().take(SHOWN).map(String::as_str).collect();
                 let more = if count > SHOWN { " ..." } else { "" };
                 Err(Error::Usage(format!(
