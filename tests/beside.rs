@@ -192,3 +192,55 @@ fn darks_without_their_bias_are_told_by_samples_below_zero() {
         assert_eq!(told.contains(doubt), is_told, "{level}: {told}");
     }
 }
+
+/// Keywords are in s by the standard, and not always by those who write them.
+#[test]
+fn times_in_ms_that_files_tell_are_told() {
+    let shop = Workshop::new();
+    let line = "demosaic light.fits --black 500 -o out.exr";
+    for (time, level, wanted) in [
+        (
+            "33.3",
+            20_000.0,
+            "an exposure of 33.3 s by its own tags is long for a frame that is as bright; 33.3 ms is 0.0333 s",
+        ),
+        ("33.3", 900.0, ""),
+        ("30.0", 20_000.0, ""),
+        (
+            "0.033 / [ms] exposure time",
+            900.0,
+            "its EXPTIME of 0.033 counts as s, as the standard has it, and its comment tells ms",
+        ),
+        ("0.033 / exposure time in seconds", 900.0, ""),
+    ] {
+        write_fits(&shop, "light.fits", SIZE, &[("EXPTIME", time)], |x, y| {
+            500.0 + level * (1.0 + 0.5 * f64::from(x) / 384.0) + 60.0 * chance(x, y, 1)
+        });
+        let said = shop.said(line, 0);
+        assert_eq!(said.contains(wanted) && !wanted.is_empty(), !said.is_empty(), "{time}: {said}");
+    }
+}
+
+/// The first 16 columns see no light and read 500 ADU.
+#[test]
+fn black_levels_that_masked_photosites_contradict_are_told() {
+    let shop = Workshop::new();
+    write_fits(&shop, "light.fits", SIZE, &[], |x, y| {
+        500.0 + if x < 16 { 12.0 * chance(x, y, 1) } else { 4000.0 + 160.0 * chance(x, y, 1) }
+    });
+    let text = "ADU, and 600 ADU come off as its black level; one of the two is wrong";
+    for (black, is_told) in [(600, true), (505, false), (500, false)] {
+        let metadata = format!(
+            "schema: cyanometer/1\nquantity: adu\ncfa: rggb\nblack_level_adu: {black}\nmasked_areas: [[0, 0, 16, 32]]\n"
+        );
+        fs::write(shop.path("light.fits.yaml"), metadata).unwrap();
+        for line in ["demosaic light.fits -o out.exr", "correct-frame light.fits --black auto -o out.exr"] {
+            let said = shop.said(line, 0);
+            assert_eq!(said.contains(text), is_told, "{black}: {said}");
+        }
+        let border = shop.said("correct-frame light.fits --black border -o out.exr", 0);
+        assert!(!border.contains(text), "{border}");
+        // A crop has none of them.
+        assert!(!shop.said("demosaic light.fits --crop 16,0,368,32 -o out.exr", 0).contains("masked photosites"));
+    }
+}

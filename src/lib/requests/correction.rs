@@ -197,6 +197,18 @@ impl Correction {
         }
     }
 
+    /// Has what comes off as a level held against masked photosites; that of the border is theirs.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Black::levels`].
+    pub fn compare_masked(&self, reader: &mut FrameReader) -> Result<()> {
+        if let BlackChoice::Known(black @ (Black::Auto | Black::Level(_))) = self.black_choice {
+            reader.compare_masked(black.levels(reader.header())?);
+        }
+        Ok(())
+    }
+
     fn settings(&self) -> DarkSettings {
         let averaging = Averaging { combine: self.combine, clip: self.clip.unwrap_or(CLIP) };
         DarkSettings { averaging, is_scaled: self.scale_dark }
