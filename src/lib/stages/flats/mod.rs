@@ -6,19 +6,21 @@
 //! classes are whole: of cells of the filter array none of whose photosites is saturated or defective. So the means of all classes are of the
 //! same places, and light that falls off towards the corners is the same share of each.
 
+mod tally;
+
 use crate::camera::levels::BlackLevels;
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, MasterNoise, Scene};
-use crate::stages::darks::{DarkFrames, DarkSettings, check_alike, check_codes, check_setting};
+use crate::stages::darks::{DarkFrames, DarkSettings, Fitness, Misfit, check_alike, check_codes, check_setting};
 use crate::stages::defects::{DefectMap, Survey, add};
 use crate::stages::masters::Frames;
 use crate::stages::saturation::{DEFECTIVE, FullLevels, SATURATED};
 use crate::stages::sites::SiteClasses;
 use crate::stages::transfer::{Passage, Transfer};
 use crate::stream::RowSource;
-use std::f64::consts::PI;
 use std::ops::Range;
+use tally::Tally;
 
 /// What no light reads in flats.
 #[derive(Debug)]
@@ -41,6 +43,8 @@ pub struct FlatFrames<S> {
     passages: Vec<Passage<Transfer>>,
     rows_made: usize,
     made: Vec<f64>,
+    /// How what comes off goes with the flats.
+    fitness: Fitness,
     warnings: Vec<String>,
 }
 
@@ -67,58 +71,6 @@ impl FlatMeans {
     /// The same with ordinary values of F, ADU by class, beyond which photosites are defective.
     pub fn within(self, limits: &[[f64; 2]]) -> Self {
         Self { limits: Some(limits.to_vec()), ..self }
-    }
-}
-
-/// Sums over the photosites of classes.
-struct Tally {
-    sums: Vec<f64>,
-    counts: Vec<u64>,
-    /// Photosites that are neither saturated nor defective, in whole cells and beside them.
-    good: Vec<u64>,
-    full: Vec<u64>,
-    finite: Vec<u64>,
-    /// Sizes of the differences between photosites of a class and the next ones in rows of whole cells: their sum, and how many.
-    changes: Vec<[f64; 2]>,
-    /// The last photosite of each class in a row.
-    last: Vec<Option<f64>>,
-    /// Whether each cell of a row of cells is whole.
-    whole: Vec<bool>,
-}
-
-impl Tally {
-    fn new(classes: usize) -> Self {
-        let none = || vec![0; classes];
-        Self {
-            sums: vec![0.0; classes],
-            counts: none(),
-            good: none(),
-            full: none(),
-            finite: none(),
-            changes: vec![[0.0; 2]; classes],
-            last: vec![None; classes],
-            whole: Vec::new(),
-        }
-    }
-
-    /// Takes in a photosite of a class in a whole cell, right of those before in its row.
-    fn take(&mut self, class: usize, flat: f64) {
-        self.sums[class] += flat;
-        self.counts[class] += 1;
-        if let Some(before) = self.last[class].replace(flat) {
-            let [sum, count] = self.changes[class];
-            self.changes[class] = [sum + (flat - before).abs(), count + 1.0];
-        }
-    }
-
-    /// The standard deviation of a class by the differences of neighbors, which slopes and dark corners leave alone; none of few.
-    ///
-    /// σ = √π/2 ⟨|x − x′|⟩        of normal noise
-    fn scatter(&self, class: usize) -> Option<f64> {
-        /// So many tell it to about 10 %.
-        const LEAST: f64 = 64.0;
-        let [sum, count] = self.changes[class];
-        (count >= LEAST).then(|| 0.5 * PI.sqrt() * sum / count)
     }
 }
 
@@ -193,6 +145,7 @@ impl<S: RowSource> FlatFrames<S> {
             passages,
             rows_made: 0,
             made,
+            fitness: Fitness::default(),
             warnings,
         }))
     }
@@ -204,19 +157,35 @@ impl<S: RowSource> FlatFrames<S> {
 
     /// Each of the frames: flats, then what comes off them.
     pub fn frames(&self) -> impl Iterator<Item = &S> {
-        let darks = if let Pedestal::Frames(darks) = &self.pedestal { Some(darks.as_ref()) } else { None };
-        self.frames.frames().chain(darks.into_iter().flat_map(DarkFrames::frames))
+        self.frames.frames().chain(self.darks().into_iter().flat_map(DarkFrames::frames))
     }
 
-    /// A frame among what comes off them whose mean is another than that of those which it counts as one with.
-    pub fn unlike_dark(&self) -> Option<(&str, [f64; 2])> {
-        if let Pedestal::Frames(darks) = &self.pedestal { darks.unlike() } else { None }
+    /// What comes off them, where that is frames.
+    pub fn darks(&self) -> Option<&DarkFrames<S>> {
+        if let Pedestal::Frames(darks) = &self.pedestal { Some(darks.as_ref()) } else { None }
+    }
+
+    /// What they are called: the name of the first, or of their average.
+    pub fn name(&self) -> &str {
+        &self.head.name
+    }
+
+    /// The head of the flats, with the sensor of the frame that they are for where theirs names none.
+    pub fn head_beside(&self, frame: &FrameHeader) -> FrameHeader {
+        of_sensor(&self.head, frame)
+    }
+
+    /// In which share of the flats their mean is below that of what came off, so far; none where that is a spot.
+    pub fn below_darks(&self) -> Option<f64> {
+        match self.fitness.misfit() {
+            Some(Misfit::Below(share)) => Some(share),
+            _ => None,
+        }
     }
 
     /// Samples of theirs that were clipped so far.
     pub fn clipped(&self) -> u64 {
-        let of_darks = if let Pedestal::Frames(darks) = &self.pedestal { darks.clipped() } else { 0 };
-        self.frames.clipped() + of_darks
+        self.frames.clipped() + self.darks().map_or(0, DarkFrames::clipped)
     }
 
     /// Makes F of the next rows.
@@ -226,6 +195,12 @@ impl<S: RowSource> FlatFrames<S> {
         match &mut self.pedestal {
             Pedestal::Frames(darks) => {
                 let darks = darks.next(rows)?;
+                let lines = self.made.chunks_exact(width).zip(darks.chunks_exact(width)).enumerate();
+                for (_, (flat, dark)) in lines.filter(|(index, _)| Fitness::looks_at(self.rows_made + index / planes)) {
+                    let flat: Vec<f32> = flat.iter().map(|sample| to_sample(*sample)).collect();
+                    // Averages of any number scatter by less than one dark frame.
+                    self.fitness.take(&flat, dark, None);
+                }
                 self.made.iter_mut().zip(darks).for_each(|(flat, dark)| *flat -= dark);
             }
             Pedestal::Level(level) => {
