@@ -355,7 +355,7 @@ mod tests {
         (share * (((x * 7 + y * 13 + x * y) % 31) as f32 - 15.0)).round()
     }
 
-    /// The last patch, the brightest of all, cut off at its mean or far below, and of a fifth of the noise of others.
+    /// The last patch, the brightest of all, cut off at its mean or far below, and of a tenth of the noise of others.
     #[test]
     fn patches_that_are_cut_off_are_told() {
         let cut = |more: &dyn Fn(usize, usize, usize) -> f32| cut_off(&read(more), 1000.0);
@@ -364,7 +364,7 @@ mod tests {
         assert_eq!(cut(&capped(f32::MAX)), []);
         assert_eq!(cut(&capped(0.0)), last);
         assert_eq!(cut(&capped(-20.0)), last);
-        assert_eq!(cut(&|patch, x, y| noise(x, y, if patch == 23 { 0.2 } else { 1.0 })), last);
+        assert_eq!(cut(&|patch, x, y| noise(x, y, if patch == 23 { 0.1 } else { 1.0 })), last);
         // Half of the noise is that of patches which are as dim as these are.
         assert_eq!(cut(&|patch, x, y| noise(x, y, if patch == 23 { 0.5 } else { 1.0 })), []);
         // Codes coarser than their noise are of one value for the most part everywhere.

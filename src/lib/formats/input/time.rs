@@ -17,11 +17,9 @@ const STRETCH: usize = 128;
 const PAIRS: usize = 4;
 /// Standard deviations by which the mean of a stretch may be low.
 const Z: f64 = 6.0;
-/// The share of the range above which the mean of a frame is bright; of a range that nothing tells.
+/// The share of the range above which the mean of a frame is bright, and where the range ends that nothing tells.
 const BRIGHT: f64 = 0.25;
-const BRIGHT_OF_CODES: f64 = 0.5;
-/// The least scatter of a scene that is bright, as a share of its mean.
-const UNEVEN: f64 = 0.05;
+const LARGEST_CODE: f64 = 65_535.0;
 
 /// What is looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,9 +33,8 @@ pub(super) struct TimeCheck {
     row: usize,
     /// The least of means of stretches, each with what it may be low.
     darkest: f64,
-    /// The count, the sum and the sum of squares of the samples, and the largest.
-    sums: [f64; 3],
-    largest: f32,
+    /// The count and the sum of the samples.
+    sums: [f64; 2],
 }
 
 impl TimeCheck {
@@ -59,8 +56,7 @@ impl TimeCheck {
             looks_like_ms,
             row: 0,
             darkest: f64::INFINITY,
-            sums: [0.0; 3],
-            largest: f32::NEG_INFINITY,
+            sums: [0.0; 2],
         })
     }
 
@@ -86,22 +82,16 @@ impl TimeCheck {
         let mean = sum / n;
         let scatter = (squares / n - mean * mean).max(0.0).sqrt();
         self.darkest = self.darkest.min(mean + Z * scatter / n.sqrt());
-        self.sums = [self.sums[0] + n, self.sums[1] + sum, self.sums[2] + squares];
-        self.largest = stretch.iter().copied().fold(self.largest, f32::max);
+        self.sums = [self.sums[0] + n, self.sums[1] + sum];
     }
 
     /// Whether the mean is that of a scene which is no night sky.
     fn is_bright(&self, frame: &FrameHeader) -> bool {
-        let [count, sum, squares] = self.sums;
-        let mean = sum / count;
+        let [count, sum] = self.sums;
         let metadata = &frame.metadata;
-        if let Some(white) = metadata.white_level_adu {
-            let black = metadata.black_level_adu.map_or(0.0, |black| black.mean());
-            return mean - black > BRIGHT * white.range_above(black);
-        }
-        let scatter = (squares / count - mean * mean).max(0.0).sqrt();
-        let top = (8..=16).map(|bits| f64::from((1_u32 << bits) - 1)).find(|top| *top >= f64::from(self.largest));
-        top.is_some_and(|top| mean > BRIGHT_OF_CODES * top) && scatter > UNEVEN * mean
+        let black = metadata.black_level_adu.map_or(0.0, |black| black.mean());
+        let range = metadata.white_level_adu.map_or(LARGEST_CODE - black, |white| white.range_above(black));
+        count > 0.0 && sum / count - black > BRIGHT * range
     }
 
     /// Why the time cannot well be in s, once all rows were looked at.
@@ -118,7 +108,7 @@ impl TimeCheck {
                 self.darkest - bias
             ));
         }
-        (self.looks_like_ms && self.sums[0] > 0.0 && self.is_bright(frame)).then(|| {
+        (self.looks_like_ms && self.is_bright(frame)).then(|| {
             format!(
                 "an exposure of {time_s} s by its own tags is long for a frame that is as bright; {time_s} ms is {in_ms} s"
             )
@@ -172,15 +162,14 @@ mod tests {
     fn bright_frames_of_a_time_in_ms_are_doubted() {
         let text = "an exposure of 33 s by its own tags is long for a frame that is as bright; 33 ms is 0.033 s";
         assert_eq!(doubt(tagged(33.0, Some(4095.0)), 2000.0, 300.0).as_deref(), Some(text));
-        assert_eq!(doubt(tagged(33.0, None), 2600.0, 800.0).as_deref(), Some(text));
+        assert_eq!(doubt(tagged(33.0, None), 26_000.0, 8000.0).as_deref(), Some(text));
         // Night skies, dark frames and flats, and times that are set.
         for (time_s, white, level, scatter) in [
             (33.0, Some(4095.0), 700.0, 300.0),
-            (33.0, None, 700.0, 300.0),
-            (33.0, None, 600.0, 20.0),
+            (33.0, None, 2600.0, 800.0),
             (30.0, Some(4095.0), 2000.0, 300.0),
-            (120.0, None, 2600.0, 800.0),
-            (0.033, None, 2600.0, 800.0),
+            (120.0, None, 26_000.0, 8000.0),
+            (0.033, None, 26_000.0, 8000.0),
         ] {
             assert_eq!(doubt(tagged(time_s, white), level, scatter), None, "{time_s} {level}");
         }

@@ -57,8 +57,10 @@ pub(super) fn of_neutrals(source: &str, patches: &[Patch], white: [f64; 3], rang
     };
     let offs: Vec<String> = Class::ALL.into_iter().map(of_class).collect();
     let cause = match found.offset[0] > 0.0 {
-        true => "the black level is too low by as much, or stray light adds it, which is in proportion to white",
-        false => "the black level is too high by as much",
+        true => {
+            "the black level is too low by as much, or stray light adds it, in proportion to white, or the light falls off along the patches"
+        }
+        false => "the black level is too high by as much, or the light falls off along the patches",
     };
     Some(Note::Warning(format!(
         "{source}: its neutral patches are not in proportion to their luminance: where no light is they would read {}{unit}; {cause}",
