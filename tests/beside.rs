@@ -192,3 +192,170 @@ fn darks_without_their_bias_are_told_by_samples_below_zero() {
         assert_eq!(told.contains(doubt), is_told, "{level}: {told}");
     }
 }
+
+/// A dark signal of 480 ADU in 240 s at 263 K: dark frames of a bias alone, and a frame that has none of it either, are told where the
+/// temperature is; where it is not, a cooled sensor may have so little.
+#[test]
+fn dark_signals_far_below_those_of_the_sensor_are_told() {
+    let shop = Workshop::new();
+    sensor(&shop, 2.0);
+    let line = "correct-frame light.fits --dark dark.fits --sensor s.yaml -o out.exr";
+    let short = "by the frame's sensor, exposure and temperature dark frames have 538.0 ADU at least";
+    let no_time = "in its exposure of 240 s its sensor has a dark signal of 48 ADU at least, and the darkest part of the frame is";
+    let time = ("EXPTIME", "240.0");
+    for (dark, of_light, temperature, wanted) in [
+        (480.0, 480.0, "-10.15", [false, false]),
+        (160.0, 160.0, "-10.15", [false, false]),
+        (0.0, 480.0, "-10.15", [true, false]),
+        (0.0, 0.0, "-10.15", [true, true]),
+        (0.0, 480.0, "", [false, false]),
+        (0.0, 0.0, "", [false, false]),
+    ] {
+        let told: Vec<_> = [("CCD-TEMP", temperature)].into_iter().filter(|(_, value)| !value.is_empty()).collect();
+        write(&shop, "light.fits", [20.0, of_light], 1, &[&[time], told.as_slice()].concat());
+        write(&shop, "dark.fits", [0.0, dark], 2, &[&[DARK, time], told.as_slice()].concat());
+        let said = shop.said(line, 0);
+        assert_eq!([short, no_time].map(|text| said.contains(text)), wanted, "{dark} {of_light} {temperature}: {said}");
+    }
+}
+
+/// Bias frames beside dark frames that are scaled: of 500 ADU where dark frames have 620. Lit ones are above these; long ones above the bias
+/// of the sensor, or the black level.
+#[test]
+fn bias_frames_that_are_none_are_told() {
+    let shop = Workshop::new();
+    sensor(&shop, 2.0);
+    write(&shop, "light.fits", [300.0, 60.0], 1, &[("EXPTIME", "30.0")]);
+    write(&shop, "dark.fits", [0.0, 120.0], 2, &[DARK, ("EXPTIME", "60.0")]);
+    let line = "correct-frame light.fits --scale-dark --dark dark.fits --bias bias.fits -o out.exr";
+    let lit = "above that of the dark frames, 6";
+    let long = "bias frames have 510.0 ADU at most; was it lit, or exposed for long?";
+    for (level, more, wanted) in [
+        (0.0, "", [false, false]),
+        (0.0, "--sensor s.yaml", [false, false]),
+        (400.0, "", [true, false]),
+        (60.0, "", [false, false]),
+        (60.0, "--sensor s.yaml", [false, true]),
+    ] {
+        write(&shop, "bias.fits", [0.0, level], 3, &[("IMAGETYP", "'Bias Frame'")]);
+        // That the bias is of no time is said of the camera, which tells none.
+        let said = shop.said(&format!("{line} {more}"), 0);
+        assert_eq!([lit, long].map(|text| said.contains(text)), wanted, "{level} {more}: {said}");
+    }
+}
+
+/// Dark frames of flats: less their bias, and of light that the flats have not.
+#[test]
+fn dark_frames_that_flats_cannot_have_are_told() {
+    let shop = Workshop::new();
+    write(&shop, "light.fits", [1000.0, 0.0], 1, &[]);
+    write(&shop, "dark.fits", [0.0, 0.0], 2, &[DARK]);
+    // A circle of light, as a fisheye has it.
+    let flat = |name: &str, seed: u64| {
+        write_fits(&shop, name, SIZE, &[("INSTRUME", "'A'")], |x, y| {
+            let light = if (128..256).contains(&x) { 8000.0 } else { 0.0 };
+            500.0 + light + (6.0 * (25.0_f64 + light)).sqrt() * chance(x, y, seed)
+        });
+    };
+    flat("flat.fits", 3);
+    let line = "correct-frame light.fits --dark dark.fits --flat flat.fits --flat-dark flat-dark.fits -o out.exr";
+    let below = "its mean is below that of what came off; are these dark or bias frames of it?";
+    for (level, is_told) in [(0.0, false), (300.0, true)] {
+        write(&shop, "flat-dark.fits", [0.0, level], 4, &[DARK]);
+        let said = shop.said(line, 0);
+        assert_eq!(said.contains(&format!("flat.fits: in 67 % of it {below}")), is_told, "{level}: {said}");
+    }
+    // Signed codes about zero: half of them below, and a flat that has no bias either.
+    let signed = |name: &str, level: f64, seed: u64| {
+        let [width, height] = SIZE;
+        let sample = |x: u32, y: u32| to_sample((level + 10.0 * chance(x, y, seed)).round());
+        let samples = (0..height).flat_map(|y| (0..width).flat_map(move |x| sample(x, y).to_le_bytes()));
+        fs::write(shop.path(name), samples.collect::<Vec<u8>>()).unwrap();
+    };
+    for (name, level, seed) in [("light", 1700.0, 5), ("dark", 500.0, 6), ("flat", 4000.0, 7)] {
+        signed(&format!("{name}.raw"), level, seed);
+    }
+    let line = "correct-frame light.raw --raw 384x32:f32le --cfa rggb --white 16383 --dark dark.raw --flat flat.raw --flat-dark f.raw -o out.exr";
+    for (level, is_told) in [(0.0, true), (500.0, false)] {
+        signed("f.raw", level, 8);
+        let said = shop.said(line, 0);
+        let text = "f.raw: 45 % of its samples are below zero";
+        assert_eq!(said.contains(text), is_told, "{level}: {said}");
+    }
+}
+
+/// Codes of 12 bits that were shifted to 16, beside darks that were not; averages of dark frames that were shifted too have finer codes.
+#[test]
+fn shifted_codes_beside_darks_that_are_not_are_told() {
+    let shop = Workshop::new();
+    let shifted = |name: &str, level: f64, scatter: f64, times: f64, step: f64, seed: u64| {
+        write_fits(&shop, name, SIZE, &[("INSTRUME", "'A'")], |x, y| {
+            // Hot photosites tell the step of quiet darks.
+            let code = level + scatter * chance(x, y, seed) + if x % 97 == 5 { 20.0 } else { 0.0 };
+            ((code * times / step).round() * step).min(65_535.0)
+        });
+    };
+    let line = "correct-frame light.fits --dark dark.fits -o out.exr";
+    let text = "light.fits: its codes are multiples of 16, those of what came off of 1, and it is brighter throughout by as many times";
+    // Level and scatter in codes of 12 bits.
+    for (level, dark_times, scatter, is_told) in
+        [(2000.0, 1.0, 5.0, true), (2000.0, 16.0, 5.0, false), (200.0, 16.0, 0.1, false)]
+    {
+        shifted("light.fits", level, 80.0, 16.0, 16.0, 1);
+        shifted("dark.fits", 100.0, scatter, dark_times, 1.0, 2);
+        let said = shop.said(line, 0);
+        assert_eq!(said.contains(text), is_told, "{level} {dark_times}: {said}");
+    }
+}
+
+/// Keywords are in s by the standard, and not always by those who write them.
+#[test]
+fn times_in_ms_that_files_tell_are_told() {
+    let shop = Workshop::new();
+    let line = "demosaic light.fits --black 500 -o out.exr";
+    for (time, level, wanted) in [
+        (
+            "33.3",
+            20_000.0,
+            "an exposure of 33.3 s by its own tags is long for a frame that is as bright; 33.3 ms is 0.0333 s",
+        ),
+        ("33.3", 900.0, ""),
+        ("30.0", 20_000.0, ""),
+        (
+            "0.033 / [ms] exposure time",
+            900.0,
+            "its EXPTIME of 0.033 counts as s, as the standard has it, and its comment tells ms",
+        ),
+        ("0.033 / exposure time in seconds", 900.0, ""),
+    ] {
+        write_fits(&shop, "light.fits", SIZE, &[("EXPTIME", time)], |x, y| {
+            500.0 + level * (1.0 + 0.5 * f64::from(x) / 384.0) + 60.0 * chance(x, y, 1)
+        });
+        let said = shop.said(line, 0);
+        assert_eq!(said.contains(wanted) && !wanted.is_empty(), !said.is_empty(), "{time}: {said}");
+    }
+}
+
+/// The first 16 columns see no light and read 500 ADU.
+#[test]
+fn black_levels_that_masked_photosites_contradict_are_told() {
+    let shop = Workshop::new();
+    write_fits(&shop, "light.fits", SIZE, &[], |x, y| {
+        500.0 + if x < 16 { 12.0 * chance(x, y, 1) } else { 4000.0 + 160.0 * chance(x, y, 1) }
+    });
+    let text = "ADU, and 600 ADU come off as its black level; one of the two is wrong";
+    for (black, is_told) in [(600, true), (505, false), (500, false)] {
+        let metadata = format!(
+            "schema: cyanometer/1\nquantity: adu\ncfa: rggb\nblack_level_adu: {black}\nmasked_areas: [[0, 0, 16, 32]]\n"
+        );
+        fs::write(shop.path("light.fits.yaml"), metadata).unwrap();
+        for line in ["demosaic light.fits -o out.exr", "correct-frame light.fits --black auto -o out.exr"] {
+            let said = shop.said(line, 0);
+            assert_eq!(said.contains(text), is_told, "{black}: {said}");
+        }
+        let border = shop.said("correct-frame light.fits --black border -o out.exr", 0);
+        assert!(!border.contains(text), "{border}");
+        // A crop has none of them.
+        assert!(!shop.said("demosaic light.fits --crop 16,0,368,32 -o out.exr", 0).contains("masked photosites"));
+    }
+}

@@ -228,6 +228,11 @@ fn marks_are_told_by_kind() {
 
 /// A chart of 24 patches as a camera with this matrix reads it, with some scatter.
 fn chart(shop: &Workshop) {
+    chart_told(shop, 100.0, f64::INFINITY);
+}
+
+/// The same with a black level that metadata tell, and cut off at a level; no light reads 100 ADU, and a perfect diffuser some 2000 above.
+fn chart_told(shop: &Workshop, black: f64, cut: f64) {
     const SIDE: usize = 40;
     let white = [0.9642, 1.0, 0.8249];
     let colors = load_reference("colorchecker").unwrap().colors_in(white).unwrap();
@@ -235,7 +240,7 @@ fn chart(shop: &Workshop) {
     let camera_from_xyz = xyz_from_camera.try_inverse().unwrap();
     let mut metadata = Metadata::new(QuantityKind::Adu);
     metadata.cfa = Some("rggb".parse().unwrap());
-    metadata.black_level_adu = Some(100.0.into());
+    metadata.black_level_adu = Some(black.into());
     metadata.white_level_adu = Some(4100.0.into());
     let geometry = Geometry::new(6 * SIDE, 4 * SIDE, &["Y"]);
     let header = FrameHeader { name: "chart".into(), geometry, metadata };
@@ -251,7 +256,7 @@ fn chart(shop: &Workshop) {
         for x in 0..6 * SIDE {
             let signal = camera_from_xyz * Vector3::from(colors[y / SIDE * 6 + x / SIDE]);
             let class = [0, 1, 1, 2][y % 2 * 2 + x % 2];
-            samples.push(to_sample(100.0 + 2000.0 * signal[class] + 4.0 * chance() - 2.0));
+            samples.push(to_sample((100.0 + 2000.0 * signal[class] + 4.0 * chance() - 2.0).min(cut)));
         }
     }
     shop.write("chart.exr", &header, &samples);
@@ -387,6 +392,44 @@ fn a_chart_that_is_turned_is_told() {
     );
     let table = "fit-matrix --patches none.csv --lens-transmittance 0.9";
     assert!(shop.said(table, BAD_USAGE).ends_with("which alone is described so; leave out --lens-transmittance\n"));
+}
+
+/// Neutral patches tell a black level that is off by 2 % of white, and none that is off by a quarter of a per cent; what is cut off below the
+/// white level; corners that are a third of a patch off, along rows and along columns.
+#[test]
+fn a_chart_tells_its_levels_and_corners() {
+    let shop = Workshop::new();
+    let at = |[x, y]: [i32; 2]| {
+        let corners = [[20, 20], [220, 20], [220, 140], [20, 140]];
+        let corners = corners.map(|[left, top]| format!("{},{}", left + x, top + y)).join(",");
+        shop.said(&format!("fit-matrix --chart chart.exr --corners {corners} -o m.yaml"), 0)
+    };
+    let neutral = "its neutral patches are not in proportion to their luminance: where no light is they would read R ";
+    for (black, wanted) in [(95.0, None), (105.0, None), (60.0, Some("40 ± ")), (140.0, Some("-40 ± "))] {
+        chart_told(&shop, black, f64::INFINITY);
+        let told = at([0, 0]);
+        match wanted {
+            None => assert_eq!(told, "", "{black}"),
+            Some(offset) => {
+                assert!(told.contains(&format!("{neutral}{offset}")), "{black}: {told}");
+                let side = if black < 100.0 { "too low by as much, or stray light" } else { "too high by as much" };
+                assert!(told.contains(side), "{told}");
+            }
+        }
+    }
+    chart_told(&shop, 100.0, 1800.0);
+    let told = at([0, 0]);
+    let cut = "G of white scatter less than dimmer patches do and lie at 1800 ADU or below: they are cut off below the white level";
+    assert!(told.contains(cut) && !told.contains(neutral), "{told}");
+    chart(&shop);
+    let edges = "patches scatter as those do across which an edge runs: the corners are off";
+    for off in [[13, 0], [0, 13], [-13, 0], [13, 13]] {
+        let told = at(off);
+        assert!(told.contains(edges), "{off:?}: {told}");
+    }
+    for off in [[3, 0], [0, -3]] {
+        assert_eq!(at(off), "", "{off:?}");
+    }
 }
 
 /// A matrix keeps what it was fitted to: sensitivity, for absolute XYZ, and the range between black and white.

@@ -30,14 +30,18 @@ pub fn is_long(time_s: f64) -> bool {
     time_s >= LONG_S
 }
 
+/// Whether a time is that of a frame of a video in ms, which nobody sets in s.
+pub fn is_frame_time_in_ms(time_s: f64) -> bool {
+    is_long(time_s) && FRAME_RATES.iter().any(|rate| (time_s * rate / 1000.0 - 1.0).abs() < SAME_TIME)
+}
+
 /// A warning of an exposure time that looks as if it were in ms, or the denominator of a fraction. Round times are those of the night.
 pub fn doubt_of_time(time_s: f64) -> Option<String> {
-    let is_near = |rate: &f64| (time_s * rate / 1000.0 - 1.0).abs() < SAME_TIME;
     let long = || format!("an exposure of {time_s} s is long");
     match time_s {
         _ if !is_long(time_s) => None,
         _ if SHUTTERS.contains(&time_s) => Some(format!("{}; 1/{time_s} s is {} s", long(), 1.0 / time_s)),
-        _ if time_s > LONGEST_S || FRAME_RATES.iter().any(is_near) => {
+        _ if time_s > LONGEST_S || is_frame_time_in_ms(time_s) => {
             Some(format!("{}; {time_s} ms is {} s", long(), time_s / 1000.0))
         }
         _ => None,

@@ -318,6 +318,13 @@ impl Metadata {
         of_exposure.chain(of_lens).chain(of_levels).chain(of_sensor).collect()
     }
 
+    /// What a black level may be below the bias: a code that a user rounded, or what one of few masked photosites is off.
+    fn black_off_adu(&self) -> f64 {
+        /// Standard deviations.
+        const Z: f64 = 5.0;
+        self.black_noise.map_or(1.0, |noise| (Z * noise.site_adu2.sqrt()).max(1.0))
+    }
+
     /// What it says of the same thing in two ways that do not agree: a warning each.
     pub fn contradictions(&self) -> Vec<String> {
         let mut known = QuantityKind::ALL.iter().filter(|kind| **kind != QuantityKind::Unspecified);
@@ -335,9 +342,10 @@ impl Metadata {
         let are_codes = self.quantity == QuantityKind::Adu && self.correction.is_none() && self.demosaic.is_none();
         let bias = self.bias_adu().filter(|_| are_codes);
         let black = self.black_level_adu.map(|level| level.sites().into_iter().fold(f64::INFINITY, f64::min));
-        let level = black.zip(bias).filter(|(black, bias)| *black < bias - 1.0).map(|(black, bias)| {
-            format!("its black level, {black} ADU, is below the bias of its converter, {bias} ADU")
-        });
+        let level =
+            black.zip(bias).filter(|(black, bias)| *black < bias - self.black_off_adu()).map(|(black, bias)| {
+                format!("its black level, {black} ADU, is below the bias of its converter, {bias} ADU")
+            });
         let times = self.exposure.zip(self.exposure_time_s).filter(|(exposure, alone)| exposure.exposure_s != *alone);
         let time = times.map(|(exposure, alone)| {
             format!(
@@ -366,5 +374,38 @@ impl Metadata {
     /// Notes that something was left out.
     pub fn leave_out(&mut self, program: &str, what: impl Into<String>, why: impl Into<String>) {
         self.left_out.push(LeftOut { program: program.into(), what: what.into(), why: why.into() });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A black level of the masked border is below the bias by what chance makes of so few photosites: of a variance of 1 ADU² by 5.
+    #[test]
+    fn a_black_level_may_be_below_the_bias_by_what_it_is_uncertain() {
+        let told = |black: f64, site_adu2: Option<f64>| {
+            let mut metadata = Metadata::new(QuantityKind::Adu);
+            metadata.adc = Some(AdcRecord::new(12, 400.0, 0.05));
+            let bias = metadata.bias_adu().unwrap();
+            metadata.black_level_adu = Some((bias + black).into());
+            metadata.black_noise = site_adu2.map(|site_adu2| BlackNoise { site_adu2, row_adu2: 0.0, column_adu2: 0.0 });
+            metadata.contradictions()
+        };
+        for (black, site_adu2, is_told) in [
+            (0.0, None, false),
+            (-0.9, None, false),
+            (-1.1, None, true),
+            (-1.1, Some(1.0), false),
+            (-5.1, Some(1.0), true),
+            (-0.9, Some(1e-4), false),
+        ] {
+            let text = told(black, site_adu2);
+            assert_eq!(
+                text.iter().any(|text| text.contains("below the bias of its converter")),
+                is_told,
+                "{black} {text:?}"
+            );
+        }
     }
 }

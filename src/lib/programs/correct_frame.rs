@@ -45,6 +45,7 @@ fn correct(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     let mut reader = arguments.described.open(&input.options())?;
     session.tell(&arguments.correction.prepare(&mut reader)?);
     let mut correction = arguments.correction.open(reader.header_mut(), input, &arguments.described)?;
+    arguments.correction.compare_masked(&mut reader)?;
     let header = correction.stage.header_mut();
     session.sign(header);
     propagation::note(header, Equations::Exact);

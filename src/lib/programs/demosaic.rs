@@ -67,6 +67,9 @@ fn demosaic(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     if let Black::Level(level) = arguments.black {
         reader.expect_black(level);
     }
+    if arguments.black != Black::None {
+        reader.compare_masked(arguments.black.levels(reader.header())?);
+    }
     session.sign(stage.header_mut());
     session.tell(requests::of_levels(stage.header()).as_slice());
     session.tell(requests::of_bent_codes(reader.header()).as_slice());

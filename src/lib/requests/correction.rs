@@ -97,8 +97,9 @@ pub struct OpenCorrection {
     pub corrections: Corrections<OneOfMany>,
     /// What came up.
     pub notes: Vec<Note>,
-    /// What the mean of dark frames can be.
+    /// What the mean of dark frames can be, and of those of the flats.
     levels: DarkLevels,
+    levels_of_flats: Option<DarkLevels>,
 }
 
 /// The frame that is corrected, where it comes from, and what is said of it.
@@ -195,6 +196,18 @@ impl Correction {
             BlackChoice::Known(black) => black,
             BlackChoice::Border(_) => Black::Auto,
         }
+    }
+
+    /// Has what comes off as a level held against masked photosites; that of the border is theirs.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Black::levels`].
+    pub fn compare_masked(&self, reader: &mut FrameReader) -> Result<()> {
+        if let BlackChoice::Known(black @ (Black::Auto | Black::Level(_))) = self.black_choice {
+            reader.compare_masked(black.levels(reader.header())?);
+        }
+        Ok(())
     }
 
     fn settings(&self) -> DarkSettings {
@@ -361,6 +374,7 @@ impl Correction {
         let on_trust = darks.as_ref().and_then(|darks| darks.stack().taken_on_trust(frame));
         remarks.extend(on_trust.clone().filter(|text| !warnings.contains(text)));
         let levels = DarkLevels::of(frame, darks.as_ref().map(DarkFrames::stack), on_trust.is_some());
+        let levels_of_flats = flats.as_ref().map(|(flats, _)| DarkLevels::of_flats(frame, flats));
         let defects = self.defects_record(beyond, dark_limits.as_ref(), flats.is_some());
         let shares_masters = company.shares_darks().unwrap_or_else(|| {
             let problem =
@@ -375,7 +389,7 @@ impl Correction {
         warnings.extend(map.as_ref().and_then(|map| map.doubt(&list, frame)));
         notes.extend(warnings.into_iter().map(Note::Warning).chain(remarks.into_iter().map(Note::Remark)));
         let corrections = Corrections { darks, dark_limits, flats, map, found: [0; 3] };
-        Ok(OpenCorrection { stage, corrections, notes, levels })
+        Ok(OpenCorrection { stage, corrections, notes, levels, levels_of_flats })
     }
 
     /// Makes sure that no frame beside `light` is a copy of it, or of another.
@@ -463,8 +477,9 @@ impl OpenCorrection {
         ];
         let level = darks.as_ref().and_then(|darks| self.levels.doubt(&self.header().name, darks));
         let unlike = darks.as_ref().and_then(DarkFrames::unlike);
-        let of_flats = flats.as_ref().and_then(|(flats, _)| flats.unlike_dark());
-        let level = level.into_iter().chain(unlike.into_iter().chain(of_flats).map(doubt_of_one));
+        let of_flats = flats.as_ref().zip(self.levels_of_flats.as_ref());
+        let of_flats = of_flats.map_or(Vec::new(), |((flats, _), levels)| levels.doubts_of_flats(flats));
+        let level = level.into_iter().chain(unlike.map(doubt_of_one)).chain(of_flats);
         let doubt = map.as_ref().and_then(DefectMap::finding).into_iter().chain(level).map(Note::Warning);
         said.into_iter().flatten().map(Note::Remark).chain(doubt).collect()
     }

@@ -5,6 +5,7 @@ use crate::camera::readout::ReadOut;
 use crate::metadata::{FrameHeader, MasterKind, Scene, TakenAs};
 use crate::stages::bounds::Bounds;
 use crate::stages::darks::{DRIFT, DarkFrames, DarkStack, Misfit};
+use crate::stages::flats::FlatFrames;
 use crate::stream::RowSource;
 
 /// What a frame and its sensor tell of the mean of its dark frames.
@@ -20,19 +21,31 @@ pub(super) struct DarkLevels {
     predicted_adu: Option<[f64; 2]>,
     /// The black level of a camera's frame.
     black_adu: Option<f64>,
+    /// What it is at least by the dark signal that the sensor predicts.
+    least_predicted_adu: Option<f64>,
+    /// What the mean of bias frames beside dark frames can well be at most, and what tells it.
+    most_bias_adu: Option<(f64, &'static str)>,
 }
 
 impl DarkLevels {
     /// Those of a frame and of what comes off it; `on_trust` where nothing tells that these are dark frames.
     pub(super) fn of(frame: &FrameHeader, darks: Option<&DarkStack>, on_trust: bool) -> Self {
         let metadata = &frame.metadata;
+        let predicted_adu = darks.and_then(|darks| predicted_level(frame, darks));
         Self {
             range_adu: range_of(frame).filter(|_| on_trust),
             least_adu: least_level(frame, darks.is_some_and(DarkStack::is_bias)),
-            most_adu: darks.and_then(|darks| most_level(frame, darks)),
-            predicted_adu: darks.and_then(|darks| predicted_level(frame, darks)),
+            most_adu: darks.and_then(|darks| most_level(frame, darks, darks.is_bias())),
+            predicted_adu,
+            least_predicted_adu: predicted_adu.and_then(|predicted| least_predicted(frame, predicted)),
+            most_bias_adu: darks.and_then(|darks| most_level(frame, darks, true)),
             black_adu: metadata.black_level_adu.filter(|_| metadata.adc.is_none()).map(BlackLevel::mean),
         }
+    }
+
+    /// Those of flats for a frame and of what comes off them.
+    pub(super) fn of_flats<S: RowSource>(frame: &FrameHeader, flats: &FlatFrames<S>) -> Self {
+        Self::of(&flats.head_beside(frame), flats.darks().map(DarkFrames::stack), false)
     }
 
     /// Whether a mean is the dark signal that the sensor predicts, for half of what it has above the bias or more.
@@ -49,15 +62,64 @@ impl DarkLevels {
         let is_told = self.explains(dark);
         let range_adu = self.range_adu.filter(|_| !is_told);
         let black_adu = self.black_adu.filter(|_| !is_told);
-        let low = self.least_adu.and_then(|least| doubt_of_low(name, dark, least));
+        let low = self.doubt_of_least(name, dark);
         low.or_else(|| doubt_of_level(name, [frame, dark], range_adu))
             .or_else(misfit)
             .or_else(|| doubt_of_scale(name, dark, black_adu))
             .or_else(|| self.most_adu.and_then(|most| doubt_of_high(name, dark, most)))
+            .or_else(|| self.doubt_of_bias(darks))
             .or_else(border)
             .or_else(below)
     }
+
+    /// What cannot well be of what came off flats, whose levels these are.
+    pub(super) fn doubts_of_flats<S: RowSource>(&self, flats: &FlatFrames<S>) -> Vec<String> {
+        let name = flats.name();
+        let of_share = |share: f64| {
+            format!(
+                "{name}: in {:.0} % of it its mean is below that of what came off; are these dark or bias frames of it?",
+                100.0 * share
+            )
+        };
+        let below = flats.below_darks().map(of_share);
+        let Some(darks) = flats.darks() else { return Vec::new() };
+        let level = || {
+            let dark = darks.mean()?;
+            self.doubt_of_least(name, dark).or_else(|| doubt_of_high(name, dark, self.most_adu?))
+        };
+        let doubt = below.or_else(level).or_else(|| self.doubt_of_bias(darks));
+        let doubt = doubt.or_else(|| darks.below_zero().map(doubt_of_negatives));
+        doubt.into_iter().chain(darks.unlike().map(doubt_of_one)).collect()
+    }
+
+    /// A warning of a mean below what dark frames have.
+    fn doubt_of_least(&self, name: &str, dark: f64) -> Option<String> {
+        let low = self.least_adu.and_then(|least| doubt_of_low(name, dark, least));
+        low.or_else(|| self.least_predicted_adu.and_then(|least| doubt_of_short(name, dark, least)))
+    }
+
+    /// A warning of bias frames beside dark frames that are none.
+    fn doubt_of_bias<S: RowSource>(&self, darks: &DarkFrames<S>) -> Option<String> {
+        let (name, bias) = darks.mean_of(MasterKind::Bias)?;
+        let (_, dark) = darks.mean_of(MasterKind::Dark)?;
+        let [near, share] = NEAR;
+        if bias - dark > near.max(share * dark.abs()) {
+            return Some(format!(
+                "{name}: its mean is {bias:.1} ADU, above that of the dark frames, {dark:.1} ADU, which a bias frame is below; was it lit, or \
+                 exposed for long?"
+            ));
+        }
+        let (most, by) = self.most_bias_adu.filter(|(most, _)| bias > *most)?;
+        Some(format!(
+            "{name}: its mean is {bias:.1} ADU, and by the frame's {by} bias frames have {most:.1} ADU at most; was it lit, or exposed for long?"
+        ))
+    }
 }
+
+/// Levels are told to so many ADU, and to such a share.
+const NEAR: [f64; 2] = [4.0, 0.02];
+/// So many times may a dark signal be off what the sensor predicts: sensors of one model, and temperatures that nobody told, differ.
+const TIMES: f64 = 10.0;
 
 /// Black and white level of a frame, where both are known.
 fn range_of(frame: &FrameHeader) -> Option<[f64; 2]> {
@@ -120,28 +182,24 @@ fn least_level(frame: &FrameHeader, is_bias: bool) -> Option<f64> {
 
 /// What the mean of dark frames of a frame can well be at most, ADU, and what tells it: the bias of its sensor and ten times the dark
 /// signal, as sensors of one model and temperatures that nobody told differ; or its black level, where no time is left for dark signal.
-fn most_level(frame: &FrameHeader, darks: &DarkStack) -> Option<(f64, &'static str)> {
-    /// Levels are told to such a share, and to so many ADU.
-    const NEAR: [f64; 2] = [0.02, 4.0];
-    /// The same of black levels of cameras.
-    const NEAR_BLACK: [f64; 2] = [0.05, 8.0];
-    const TIMES: f64 = 10.0;
+fn most_level(frame: &FrameHeader, darks: &DarkStack, is_bias: bool) -> Option<(f64, &'static str)> {
+    /// Black levels of cameras are told to so many ADU, and to such a share.
+    const NEAR_BLACK: [f64; 2] = [8.0, 0.05];
     /// Exposures in which no camera collects a dark signal that shows, s.
     const SHORT_S: f64 = 0.1;
     let metadata = &frame.metadata;
-    let off = |level: f64, near: [f64; 2]| level + (near[0] * level.abs()).max(near[1]);
+    let off = |level: f64, near: [f64; 2]| level + near[0].max(near[1] * level.abs());
     if let Some(readout) = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref()) {
         let own = (metadata.time_s(), metadata.temperature_k());
         let masters = darks.masters();
         let of_masters = masters.iter().map(|master| (master.exposure_s.or(own.0), master.temperature_k.or(own.1)));
         let doses = std::iter::once(own).chain(of_masters).map(|conditions| dark_charge_e(readout, conditions));
-        let most_e =
-            if darks.is_bias() { 0.0 } else { doses.into_iter().try_fold(0.0, |most: f64, e| Some(most.max(e?)))? };
+        let most_e = if is_bias { 0.0 } else { doses.into_iter().try_fold(0.0, |most: f64, e| Some(most.max(e?)))? };
         let slope = metadata.adu_per_e().unwrap_or(readout.adu_per_e);
         let bias = metadata.bias_adu().unwrap_or(readout.bias_adu);
         return Some((off(bias, NEAR) + TIMES * slope * most_e, "sensor"));
     }
-    let is_short = darks.is_bias() || metadata.time_s().is_some_and(|time_s| time_s <= SHORT_S);
+    let is_short = is_bias || metadata.time_s().is_some_and(|time_s| time_s <= SHORT_S);
     let black = metadata.black_level_adu.filter(|_| is_short)?;
     Some((off(black.largest(), NEAR_BLACK), "black level"))
 }
@@ -166,6 +224,30 @@ fn predicted_level(frame: &FrameHeader, darks: &DarkStack) -> Option<[f64; 2]> {
     });
     let slope = metadata.adu_per_e().unwrap_or(readout.adu_per_e);
     Some([metadata.bias_adu().unwrap_or(readout.bias_adu), slope * charge_e.sum::<Option<f64>>()?])
+}
+
+/// What the mean of dark frames is at least where the sensor predicts a dark signal above a bias, ADU; none of one that does not show. Where
+/// nothing tells the temperature, a cooled sensor has a tenth of it again.
+fn least_predicted(frame: &FrameHeader, [bias, signal]: [f64; 2]) -> Option<f64> {
+    let metadata = &frame.metadata;
+    let is_told = metadata.sensor_temperature_k.is_some() || metadata.noise.is_some();
+    let readout = metadata.sensor.as_ref()?.readout.as_ref()?;
+    // A full photosite has no more.
+    let full = 0.5 * metadata.adu_per_e().unwrap_or(readout.adu_per_e) * readout.full_well_e;
+    let least = (signal / if is_told { TIMES } else { TIMES * TIMES }).min(full);
+    let [near, share] = NEAR;
+    let off = near.max(share * bias.abs());
+    (least > off).then_some(bias - off + least)
+}
+
+/// A warning of what came off a frame and lies far below the dark signal that its sensor has.
+fn doubt_of_short(name: &str, dark: f64, least: f64) -> Option<String> {
+    (dark < least).then(|| {
+        format!(
+            "{name}: what came off has a mean of {dark:.1} ADU, and by the frame's sensor, exposure and temperature dark frames have {least:.1} \
+             ADU at least; are these bias frames, or of a shorter exposure, or does the camera take dark signal off itself?"
+        )
+    })
 }
 
 /// A warning of what came off a frame and lies above what dark frames of it read.
@@ -226,6 +308,10 @@ fn doubt_of_misfit(name: &str, misfit: Misfit) -> String {
         Misfit::Step([frame, darks]) => format!(
             "{name}: its codes are multiples of {frame}, those of what came off of {darks}; their scales may differ, as those of 14 and of \
              16 bits do"
+        ),
+        Misfit::Shifted([frame, darks]) => format!(
+            "{name}: its codes are multiples of {frame}, those of what came off of {darks}, and it is brighter throughout by as many times; \
+             unless these are averages their scales differ, as those of 12 bits and of 16 do"
         ),
         Misfit::Scatters(share) => format!(
             "{name}: what came off scatters more than it in {} of it, and dark frames of its gain, scale and temperature scatter less",

@@ -167,6 +167,12 @@ impl<S: RowSource> Frames<S> {
         (off(&farthest) > allowed).then(|| (head.name.as_str(), [of_frames[farthest], median]))
     }
 
+    /// The mean of what was read of all of them so far; none of nothing.
+    pub fn level(&self) -> Option<f64> {
+        let [sum, count] = self.levels.iter().fold([0.0; 2], |[sum, count], of| [sum + of.sum, count + of.count]);
+        (count > 0.0).then(|| sum / count)
+    }
+
     /// The first frame that has more samples below zero so far than codes of a camera do, and their share.
     pub fn below_zero(&self) -> Option<(&str, f64)> {
         /// Programs that average codes, or take out what stands out, leave fewer.

@@ -3,4 +3,5 @@
 pub mod fit;
 pub mod grid;
 pub mod judgment;
+pub mod neutrals;
 pub mod reading;

@@ -16,6 +16,22 @@ const FEWEST_SITES: u64 = 16;
 /// A patch is uneven where its photosites scatter by more than so many times what neighbors differ by.
 const UNEVEN: f64 = 2.0;
 
+/// So many pairs of neighbors tell that by themselves: the ratio of both variances is 1 within 1/√pairs, and ¼ is 4 of these off. Of fewer
+/// two classes tell it.
+const ENOUGH_PAIRS: u64 = 30;
+
+/// Scatter beside the noise, as a share of the signal, that light and texture do not make within half a patch: an edge.
+const EDGE: f64 = 0.1;
+
+/// Of so few photosites no class of a patch is told to be cut off.
+const ENOUGH_TO_CUT: u64 = 30;
+/// The least share of photosites at their largest value where samples are cut off; of noise of two codes it is next to none.
+const CUT_SHARE: f64 = 0.25;
+/// The noise of what is full is less than this share of that of patches which are dimmer: of light brighter ones have more.
+const CUT_NOISE: f64 = 0.25;
+/// Signals of patches that tell the noise of a brighter one, as shares of its signal.
+const DIMMER: std::ops::Range<f64> = 0.3..0.95;
+
 /// What was read of a patch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReadPatch {
@@ -25,8 +41,15 @@ pub struct ReadPatch {
     pub variance: [f64; 3],
     /// Standard deviations of single photosites, shares of white level less black level.
     pub scatter: [f64; 3],
-    /// The same from the differences of neighbors, which what varies slowly does not add to.
+    /// The same from the differences of neighbors, which what varies slowly does not add to: of those along rows or along columns, which
+    /// are less across an edge.
     pub noise: [f64; 3],
+    /// Of these the fewer.
+    pub pairs: [u64; 3],
+    /// The largest sample of each class, ADU, and the next one below it.
+    pub largest: [[f32; 2]; 3],
+    /// How many are at the largest.
+    pub at_largest: [u64; 3],
     /// Photosites of each class.
     pub count: [u64; 3],
     /// Photosites that are saturated.
@@ -36,8 +59,46 @@ pub struct ReadPatch {
 impl ReadPatch {
     /// Whether it scatters by far more than its noise: texture, glare, a gradient, an edge.
     pub fn is_uneven(&self) -> bool {
-        (0..3).any(|class| self.scatter[class] > UNEVEN * self.noise[class])
+        let scatters = |class: &usize| self.scatter[*class] > UNEVEN * self.noise[*class];
+        let classes = (0..3).filter(scatters);
+        let weight = |class: usize| if self.pairs[class] < ENOUGH_PAIRS { 1 } else { 2 };
+        classes.map(weight).sum::<u8>() >= 2
     }
+
+    /// Whether it scatters as a patch does across which an edge runs.
+    pub fn has_edge(&self) -> bool {
+        let beside = |class: usize| self.scatter[class].powi(2) - self.noise[class].powi(2);
+        self.is_uneven() && (0..3).any(|class| beside(class) > (EDGE * self.signal[class]).powi(2))
+    }
+
+    /// The distance of the two largest values of a class, ADU: a code, or a few.
+    fn step(&self, class: usize) -> f64 {
+        let [largest, next] = self.largest[class];
+        f64::from(largest - next)
+    }
+}
+
+/// The classes of each patch that are cut off, though no sample of it is at the level of saturated ones: many of one value, the largest, or of
+/// far less noise than dimmer patches have. `range_adu` is white level less black level. Coarse codes, of less noise than a code, do not
+/// tell it.
+pub fn cut_off(read: &[ReadPatch], range_adu: f64) -> Vec<(usize, usize)> {
+    let is_cut = |patch: &ReadPatch, class: usize| {
+        let is_dimmer = |other: &&ReadPatch| {
+            DIMMER.contains(&(other.signal[class] / patch.signal[class])) && other.count[class] >= ENOUGH_TO_CUT
+        };
+        let others: Vec<&ReadPatch> = read.iter().filter(is_dimmer).collect();
+        let least = |of: &dyn Fn(&&ReadPatch) -> f64| others.iter().map(of).fold(f64::INFINITY, f64::min);
+        let noise = range_adu * least(&|other| other.noise[class]);
+        let step = least(&|other| other.step(class));
+        if others.len() < 2 || patch.count[class] < ENOUGH_TO_CUT || !(2.0 * step..).contains(&noise) {
+            return false;
+        }
+        let share = patch.at_largest[class] as f64 / patch.count[class] as f64;
+        share >= CUT_SHARE || range_adu * patch.noise[class] < CUT_NOISE * noise
+    };
+    let open = read.iter().enumerate().filter(|(_, patch)| patch.saturated == 0);
+    open.flat_map(|(index, patch)| (0..3).filter(move |class| is_cut(patch, *class)).map(move |class| (index, class)))
+        .collect()
 }
 
 /// Sums of one class of one patch.
@@ -47,9 +108,12 @@ struct Sums {
     /// Mean and sum of squares about it, updated photosite by photosite.
     mean: f64,
     about_mean: f64,
-    pairs: u64,
-    of_differences: f64,
+    /// Pairs of neighbors along rows and along columns, and the squares of what they differ by.
+    pairs: [u64; 2],
+    of_differences: [f64; 2],
     saturated: u64,
+    largest: [f32; 2],
+    at_largest: u64,
 }
 
 impl Sums {
@@ -58,6 +122,31 @@ impl Sums {
         let from_mean = value - self.mean;
         self.mean += from_mean / self.count as f64;
         self.about_mean += from_mean * (value - self.mean);
+    }
+
+    fn add_pair(&mut self, along: usize, difference: f64) {
+        self.pairs[along] += 1;
+        self.of_differences[along] += difference.powi(2);
+    }
+
+    fn note_largest(&mut self, sample: f32) {
+        let [largest, next] = self.largest;
+        if self.count == 1 || sample > largest {
+            let before = if self.count == 1 { f32::NEG_INFINITY } else { largest };
+            (self.largest, self.at_largest) = ([sample, before], 1);
+        } else if sample == largest {
+            self.at_largest += 1;
+        } else if sample > next {
+            self.largest[1] = sample;
+        }
+    }
+
+    /// The standard deviation by the differences of neighbors, and how many pairs tell it.
+    fn noise(&self) -> (f64, u64) {
+        let by = |along: usize| (self.of_differences[along] / (2 * self.pairs[along].max(1)) as f64).sqrt();
+        let fewest = self.pairs[0].min(self.pairs[1]);
+        let told = [0, 1].into_iter().filter(|along| self.pairs[*along] > 0);
+        (told.map(by).fold(f64::INFINITY, f64::min), fewest)
     }
 }
 
@@ -73,6 +162,8 @@ pub struct ChartReader {
     width: usize,
     next_row: usize,
     sums: Vec<[Sums; 3]>,
+    /// Of the last even and the last odd row the patch and the value at each column.
+    above: [Vec<Option<(usize, f64)>>; 2],
 }
 
 impl ChartReader {
@@ -113,7 +204,8 @@ impl ChartReader {
         }
         let sums = vec![[Sums::default(); 3]; PATCHES];
         let origin = frame.geometry.origin;
-        Ok(Self { grid, pattern, origin, black, full: full.classes(), range, width, next_row: 0, sums })
+        let above = std::array::from_fn(|_| vec![None; width]);
+        Ok(Self { grid, pattern, origin, black, full: full.classes(), range, width, next_row: 0, sums, above })
     }
 
     /// White level less black level of the frame, ADU, of which signals are shares.
@@ -131,8 +223,9 @@ impl ChartReader {
             // Of even and odd columns the last photosite and its patch.
             let mut last: [Option<(usize, f64)>; 2] = [None; 2];
             for (x, sample) in row.iter().enumerate() {
+                let above = &mut self.above[y % 2][x];
                 let Some(patch) = self.grid.patch(x as f64, y as f64) else {
-                    last[x % 2] = None;
+                    (last[x % 2], *above) = (None, None);
                     continue;
                 };
                 let class = classes[x % 2] as usize;
@@ -140,11 +233,13 @@ impl ChartReader {
                 let sums = &mut self.sums[patch][class];
                 sums.saturated += u64::from(sample.is_nan() || *sample >= self.full[class]);
                 sums.add(value);
-                if let Some((_, before)) = last[x % 2].filter(|(other, _)| *other == patch) {
-                    sums.pairs += 1;
-                    sums.of_differences += (value - before).powi(2);
+                sums.note_largest(*sample);
+                for (along, neighbor) in [last[x % 2], *above].into_iter().enumerate() {
+                    if let Some((_, before)) = neighbor.filter(|(other, _)| *other == patch) {
+                        sums.add_pair(along, value - before);
+                    }
                 }
-                last[x % 2] = Some((patch, value));
+                (last[x % 2], *above) = (Some((patch, value)), Some((patch, value)));
             }
         }
     }
@@ -163,12 +258,14 @@ impl ChartReader {
         }
         let read = |sums: [Sums; 3]| {
             let variance = |s: Sums| s.about_mean / (s.count - 1) as f64;
-            let noise = |s: Sums| (s.of_differences / (2 * s.pairs.max(1)) as f64).sqrt();
             ReadPatch {
                 signal: sums.map(|s| s.mean),
                 variance: sums.map(|s| variance(s) / s.count as f64),
                 scatter: sums.map(|s| variance(s).sqrt()),
-                noise: sums.map(noise),
+                noise: sums.map(|s| s.noise().0),
+                pairs: sums.map(|s| s.noise().1),
+                largest: sums.map(|s| s.largest),
+                at_largest: sums.map(|s| s.at_largest),
                 count: sums.map(|s| s.count),
                 saturated: sums.iter().map(|s| s.saturated).sum(),
             }
@@ -251,6 +348,39 @@ mod tests {
         }
         let stripes = read(|_, _, y| if (y / 2) % 2 == 0 { 8.0 } else { -8.0 });
         assert!(stripes.iter().all(ReadPatch::is_uneven));
+    }
+
+    /// Noise of up to 15 codes, the same number of each, as `share` of it.
+    fn noise(x: usize, y: usize, share: f32) -> f32 {
+        (share * (((x * 7 + y * 13 + x * y) % 31) as f32 - 15.0)).round()
+    }
+
+    /// The last patch, the brightest of all, cut off at its mean or far below, and of a tenth of the noise of others.
+    #[test]
+    fn patches_that_are_cut_off_are_told() {
+        let cut = |more: &dyn Fn(usize, usize, usize) -> f32| cut_off(&read(more), 1000.0);
+        let last = vec![(23, 0), (23, 1), (23, 2)];
+        let capped = |cap: f32| move |patch, x, y| noise(x, y, 1.0).min(if patch == 23 { cap } else { f32::MAX });
+        assert_eq!(cut(&capped(f32::MAX)), []);
+        assert_eq!(cut(&capped(0.0)), last);
+        assert_eq!(cut(&capped(-20.0)), last);
+        assert_eq!(cut(&|patch, x, y| noise(x, y, if patch == 23 { 0.1 } else { 1.0 })), last);
+        // Half of the noise is that of patches which are as dim as these are.
+        assert_eq!(cut(&|patch, x, y| noise(x, y, if patch == 23 { 0.5 } else { 1.0 })), []);
+        // Codes coarser than their noise are of one value for the most part everywhere.
+        assert_eq!(cut(&|_, x, y| noise(x, y, 0.03)), []);
+    }
+
+    /// An edge at a column: neighbors in a row differ across it, those in a column do not.
+    #[test]
+    fn edges_are_told_whichever_way_they_run() {
+        let edges = |is_beyond: &dyn Fn(usize, usize) -> bool| {
+            let patches = read(|_, x, y| noise(x, y, 0.2) + if is_beyond(x, y) { 100.0 } else { 0.0 });
+            patches.iter().filter(|patch| patch.has_edge()).count()
+        };
+        assert_eq!(edges(&|_, _| false), 0);
+        assert_eq!(edges(&|x, _| x % 40 > 24), PATCHES);
+        assert_eq!(edges(&|_, y| (y + 35) % 40 > 24), PATCHES);
     }
 
     #[test]

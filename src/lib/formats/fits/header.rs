@@ -37,6 +37,8 @@ pub(super) struct Header {
     cards: BTreeMap<String, Value>,
     /// Keywords that stand there again with another value.
     pub repeated: BTreeSet<String>,
+    /// Keywords whose comment tells milliseconds.
+    pub in_ms: BTreeSet<String>,
     /// Its bytes, in whole blocks.
     pub bytes: u64,
 }
@@ -75,6 +77,9 @@ impl Header {
                 if let Some(value) = rest.strip_prefix("= ")
                     && (KEPT.contains(&keyword) || keyword.starts_with("NAXIS"))
                 {
+                    if tells_ms(value) {
+                        header.in_ms.insert(keyword.to_owned());
+                    }
                     let value = value_of(value);
                     let counts = header.cards.entry(keyword.to_owned()).or_insert_with(|| value.clone());
                     if *counts != value {
@@ -153,6 +158,13 @@ fn value_of(text: &str) -> Value {
             _ => Value::Other,
         },
     }
+}
+
+/// Whether the comment behind a number names milliseconds: `/ [ms] exposure time`.
+fn tells_ms(text: &str) -> bool {
+    let comment = text.split_once('/').map(|(_, comment)| comment.to_ascii_lowercase()).unwrap_or_default();
+    let mut words = comment.split(|letter: char| !letter.is_ascii_alphabetic());
+    words.any(|word| ["ms", "msec", "msecs"].contains(&word) || word.starts_with("millisec"))
 }
 
 /// What stands behind a header.

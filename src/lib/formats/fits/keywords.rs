@@ -180,6 +180,14 @@ fn told_time(header: &Header, doubts: &mut Vec<String>) -> Option<f64> {
         ("EXPOSURE", header.number("EXPOSURE")),
         ("EXPOINUS", header.number("EXPOINUS").map(|us| us / US_PER_S)),
     ];
+    let in_ms = told.iter().find(|(key, time)| time.is_some() && header.in_ms.contains(*key) && *key != "EXPOINUS");
+    doubts.extend(in_ms.map(|(key, time_s)| {
+        let time_s = time_s.unwrap_or_default();
+        format!(
+            "its {key} of {time_s} counts as s, as the standard has it, and its comment tells ms; {time_s} ms is {} s",
+            time_s / 1000.0
+        )
+    }));
     first_of("exposure time in s", &told, SAME_NUMBER, doubts)
 }
 

@@ -2,8 +2,10 @@
 
 use super::codes::CodeCheck;
 use super::levels::LevelCheck;
+use super::masked::MaskedCheck;
+use super::time::TimeCheck;
 use super::top::TopCheck;
-use crate::camera::levels::BlackLevel;
+use crate::camera::levels::{BlackLevel, BlackLevels};
 use crate::error::Result;
 use crate::metadata::FrameHeader;
 
@@ -12,11 +14,15 @@ use crate::metadata::FrameHeader;
 pub(super) struct Checks {
     /// The black level that a user says.
     pub said_black: Option<BlackLevel>,
-    /// Whether samples that are heaped at the top are told.
+    /// What comes off as a black level.
+    pub taken_black: Option<BlackLevels>,
+    /// Whether samples that are heaped at the top are told, and times that cannot be.
     tells_top: bool,
     codes: Option<CodeCheck>,
     levels: Option<LevelCheck>,
     top: Option<TopCheck>,
+    masked: Option<MaskedCheck>,
+    time: Option<TimeCheck>,
 }
 
 impl Checks {
@@ -26,11 +32,13 @@ impl Checks {
     }
 
     /// Makes ready for the rows of a frame, whose layer of marks comes with them where `is_marked`; those of codes only where they are
-    /// given as they are stored.
-    pub fn begin(&mut self, frame: &FrameHeader, is_marked: bool, are_stored: bool) {
+    /// given as they are stored. The exposure time is that of the file's own tags where `is_tagged`.
+    pub fn begin(&mut self, frame: &FrameHeader, is_marked: bool, are_stored: bool, is_tagged: bool) {
         if are_stored {
             (self.codes, self.levels) = (CodeCheck::of(frame), LevelCheck::of(frame, self.said_black));
             self.top = TopCheck::of(frame).filter(|_| self.tells_top && !is_marked);
+            self.time = TimeCheck::of(frame, is_tagged).filter(|_| self.tells_top);
+            self.masked = self.taken_black.take().and_then(|black| MaskedCheck::of(frame, black));
         }
     }
 
@@ -43,6 +51,8 @@ impl Checks {
         self.codes.as_mut().map_or(Ok(()), |codes| codes.look(rows, frame))?;
         self.levels.as_mut().map_or(Ok(()), |levels| levels.look(rows, frame))?;
         self.top.iter_mut().for_each(|top| top.look(rows, frame));
+        self.masked.iter_mut().for_each(|masked| masked.look(rows, frame));
+        self.time.iter_mut().for_each(|time| time.look(rows, frame));
         Ok(())
     }
 
@@ -53,6 +63,8 @@ impl Checks {
     /// Those of [`LevelCheck::end`].
     pub fn end(&mut self, frame: &FrameHeader) -> Result<()> {
         self.top.take().iter().for_each(|top| top.end(frame));
+        self.masked.take().into_iter().for_each(|masked| masked.end(frame));
+        self.time.take().into_iter().for_each(|time| time.end(frame));
         self.levels.as_mut().map_or(Ok(()), |levels| levels.end(frame))
     }
 }

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Geometry, THREE_PLANES};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::names::place_of;
-use crate::stages::saturation::MASK_LAYER;
+use crate::stages::saturation::{MASK_BITS, MASK_LAYER, bits};
 use crate::units::QuantityKind;
 
 /// What the names of layers of standard deviations begin with.
@@ -97,6 +97,13 @@ fn keep_planes(stored: &Geometry, all: bool, quantity: QuantityKind) -> Geometry
         }
     }
     kept
+}
+
+/// Counts the pixels that a row of the layer of marks tells, by [`MASK_BITS`].
+pub(super) fn count_marks(row: &[f32], counts: &mut [u64; MASK_BITS.len()]) {
+    for mark in row.iter().map(|mark| bits(*mark)) {
+        counts.iter_mut().zip(MASK_BITS).for_each(|(count, (bit, _))| *count += u64::from(mark & bit != 0));
+    }
 }
 
 /// How the note of channels that no stage sees ends.

@@ -6,16 +6,18 @@ mod codes;
 mod described;
 mod kept;
 mod levels;
+mod masked;
 mod metadata;
 mod opening;
 mod options;
+mod time;
 mod top;
 
 pub use options::{InputOptions, Linearizing, OfCamera};
 
 use self::checks::Checks;
 use self::described::DigestCheck;
-use self::kept::{LEFT_OUT, Taken, cut, left_out};
+use self::kept::{LEFT_OUT, Taken, count_marks, cut, left_out};
 use self::metadata::{Found, doubt_of_marks, find_metadata, placed, take_scaling};
 use self::opening::{head_of, is_file, of_upstream, open_piped, open_seekable, open_unseekable, readers_of};
 use super::digest::SamplesDigest;
@@ -26,14 +28,14 @@ use super::makers::{MakersReader, Worker};
 use super::sequence::Sequence;
 use super::viewable::Scaling;
 use super::{headerless, register, table, tiff};
-use crate::camera::levels::BlackLevel;
+use crate::camera::levels::{BlackLevel, BlackLevels};
 use crate::camera::noise_profile::NoiseProfile;
 use crate::camera::optics::Exposure;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::FrameHeader;
 use crate::stages::linearize::Linearize;
-use crate::stages::saturation::{MASK_BITS, MASK_LAYER, bits, with_mask};
+use crate::stages::saturation::{MASK_BITS, MASK_LAYER, with_mask};
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use std::fs::File;
@@ -280,6 +282,11 @@ impl FrameReader {
         self.checks.said_black = Some(black).filter(|_| self.header.metadata.black_level_adu.is_none());
     }
 
+    /// Holds a black level that comes off against what masked photosites of the frame read.
+    pub fn compare_masked(&mut self, black: BlackLevels) {
+        self.checks.taken_black = Some(black);
+    }
+
     /// How the file stores its samples, in a word: `u16`, `f32` …; `mixed` where channels differ.
     pub fn stored_as(&self) -> &'static str {
         self.reader.stored_as().map_or("mixed", SampleType::name)
@@ -443,7 +450,8 @@ impl RowSource for FrameReader {
         let mut buffer = std::mem::take(&mut self.buffer);
         if !self.has_begun {
             self.has_begun = true;
-            self.checks.begin(&self.header, self.mask.is_some(), self.linearize.is_none());
+            let is_tagged = self.header.metadata.time_s() == self.reader.own_tags().time_s();
+            self.checks.begin(&self.header, self.mask.is_some(), self.linearize.is_none(), is_tagged);
             self.pass_over(self.corner[1], &mut buffer)?;
         }
         let stored = self.reader.geometry();
@@ -476,10 +484,7 @@ impl RowSource for FrameReader {
                 if let Some(mask) = mask {
                     samples.extend_from_slice(plane(mask));
                 } else if let Some(mask) = self.mask {
-                    for mark in plane(mask).iter().map(|mark| bits(*mark)) {
-                        let counts = self.marked.iter_mut().zip(MASK_BITS);
-                        counts.for_each(|(count, (bit, _))| *count += u64::from(mark & bit != 0));
-                    }
+                    count_marks(plane(mask), &mut self.marked);
                 }
             }
         }

@@ -4,6 +4,7 @@ use super::super::described::{Described, DescribedWithBlack, SaidExposure};
 use super::super::notes::Note;
 use super::super::options::Selection;
 use super::super::values;
+use super::chart_doubts;
 use super::exposure::ChartExposure;
 use crate::analysis::characterization::regression::residuals;
 use crate::analysis::characterization::{
@@ -105,8 +106,8 @@ struct Seen {
     /// White level less black level, where means are not shares of it already.
     range_adu: Option<f64>,
     notes: Vec<Note>,
-    /// Patches that scatter by more than their noise.
-    uneven: Vec<usize>,
+    /// What was read of the patches of a chart in a frame; none of a table.
+    read: Vec<ReadPatch>,
 }
 
 /// What a camera read of the patches of a chart if it is turned.
@@ -214,6 +215,7 @@ impl ChartFit {
         };
         let mut notes: Vec<Note> = seen.notes.iter().chain(&expected.notes).cloned().collect();
         notes.extend(doubts(&seen, &expected, &found));
+        notes.extend(chart_doubts::of_neutrals(&seen.source, &patches, expected.white, seen.range_adu));
         let matrix = self.matrix(&seen, &expected, &reference, &patches, &found)?;
         Ok(Some(ChartFound { matrix, judgment, notes }))
     }
@@ -250,7 +252,7 @@ impl ChartFit {
             frame: None,
             range_adu: self.levels.map(|_| range),
             notes: Vec::new(),
-            uneven: Vec::new(),
+            read: Vec::new(),
         })
     }
 
@@ -388,6 +390,7 @@ fn see_frame(mut reader: FrameReader, corners: [[f64; 2]; 4]) -> Result<(Seen, V
         charts.push((corners, ChartReader::new(&frame, grid)?));
     }
     let range_adu = charts.first().map(|(_, chart)| chart.range_adu());
+    frame.black_levels()?.into_iter().for_each(|black| reader.compare_masked(black));
     let height = frame.geometry.height;
     let step = frame.geometry.band_rows(frame.geometry.step_rows(reader.natural_rows()), 1);
     let (mut rows, mut done) = (Vec::new(), 0);
@@ -416,7 +419,7 @@ fn seen_in(frame: &FrameHeader, read: &[ReadPatch], notes: Vec<Note>) -> Seen {
         source: frame.name.clone(),
         names: None,
         left_out: full.map(|(index, patch)| (index, format!("{} photosites are saturated", patch.saturated))).collect(),
-        uneven: (0..read.len()).filter(|index| read[*index].is_uneven()).collect(),
+        read: read.to_vec(),
         signals: read.iter().map(|patch| Vector3::from(patch.signal)).collect(),
         covariances: read
             .iter()
@@ -469,14 +472,8 @@ fn doubts(seen: &Seen, expected: &Expected, found: &ChartMatrix) -> Vec<Note> {
         .iter()
         .map(|(index, why)| Note::Warning(format!("{}: the patch {} is left out: {why}", seen.source, name(*index))))
         .collect();
-    if !seen.uneven.is_empty() {
-        let names: Vec<String> = seen.uneven.iter().map(|index| name(*index)).collect();
-        notes.push(Note::Warning(format!(
-            "{}: more scatter than noise within {}: texture, glare, a gradient or an edge; check the corners",
-            seen.source,
-            names.join(", ")
-        )));
-    }
+    let range_adu = seen.range_adu.unwrap_or(1.0);
+    notes.extend(chart_doubts::of_patches(&seen.source, &seen.read, name, range_adu));
     if let Some(chi_squared) = found.chi_squared_of_noise {
         let ratio = chi_squared / found.degrees as f64;
         let text = if found.misfit > 0.0 {

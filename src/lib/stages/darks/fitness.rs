@@ -64,6 +64,10 @@ pub struct Fitness {
     /// Those that could scatter less than what came off, and those that do.
     scattering: [u64; 2],
     steps: [Steps; 2],
+    /// The least of the means of stretches as multiples of those of the darks; of darks above 0 alone.
+    least_ratio: Option<f64>,
+    /// The sum of the scatters of the darks.
+    scatter: f64,
 }
 
 /// Why what came off cannot well be dark frames.
@@ -73,19 +77,21 @@ pub enum Misfit {
     Below(f64),
     /// Its codes are multiples of a step, and those of the frame of another.
     Step([u64; 2]),
+    /// Codes of the frame are multiples of a larger step, and nowhere below so many times those of what came off.
+    Shifted([u64; 2]),
     /// In such a share of the frame it scatters more.
     Scatters(f64),
 }
 
 impl Fitness {
     /// Whether a row is looked at.
-    pub(super) fn looks_at(y: usize) -> bool {
+    pub(in crate::stages) fn looks_at(y: usize) -> bool {
         (y / 2).is_multiple_of(PAIRS)
     }
 
     /// Looks at a row of one plane of a frame and at what comes off it, `factor` times which are sums of codes; none where these are
     /// scaled, and their noise is not that of one frame or less.
-    pub(super) fn take(&mut self, frame: &[f32], darks: &[f64], factor: Option<f64>) {
+    pub(in crate::stages) fn take(&mut self, frame: &[f32], darks: &[f64], factor: Option<f64>) {
         if let Some(factor) = factor {
             self.steps[0].take(frame.iter().map(|sample| f64::from(*sample)));
             self.steps[1].take(darks.iter().map(|dark| factor * dark));
@@ -111,6 +117,9 @@ impl Fitness {
         let [of_frame, of_darks] = [frame, darks].map(scatter);
         let margin = DEVIATIONS * of_frame.hypot(of_darks) / n.sqrt() + DRIFT[0].max(DRIFT[1] * b.abs());
         self.stretches += 1;
+        let ratio = if b > 0.0 { a / b } else { 0.0 };
+        self.least_ratio = Some(self.least_ratio.map_or(ratio, |least| least.min(ratio)));
+        self.scatter += of_darks;
         self.below += u64::from(b - a > margin);
         if !has_noise_of_one || of_darks < LEAST_SCATTER {
             return;
@@ -126,6 +135,21 @@ impl Fitness {
         self.scattering[1] += u64::from(is_less);
     }
 
+    /// Whether codes of the frame may be those of the darks times a step: then all of it is above its bias, so many times that of the darks.
+    /// Averages of dark frames of its own scale have finer codes too, but scatter by some of its steps.
+    fn is_shifted(&self, frame: u64, darks: u64) -> bool {
+        /// Two bits, as those of 14 in 16.
+        const LEAST: u64 = 4;
+        /// Frames have all of their bias everywhere; black levels drift.
+        const OF_STEP: f64 = 0.5;
+        /// The least scatter of averages, in steps: rounding of codes leaves as much, in the noise of few frames or in their pattern.
+        const OF_SCATTER: f64 = 0.25;
+        let step = frame as f64 / darks as f64;
+        frame >= LEAST * darks
+            && self.least_ratio.is_some_and(|least| least >= OF_STEP * step)
+            && self.scatter < OF_SCATTER * frame as f64 * self.stretches as f64
+    }
+
     /// Why what came off cannot well be dark frames of the frame; none where nothing speaks against it.
     pub fn misfit(&self) -> Option<Misfit> {
         /// Shares of a frame below which it is a spot.
@@ -138,8 +162,10 @@ impl Fitness {
         let scatters = share(self.scattering[1], self.scattering[0]);
         let [frame, darks] = self.steps.map(|steps| steps.step());
         // Coarse codes of bright light alone are those of cameras whose steps rise with level.
-        match frame.zip(darks).filter(|(frame, darks)| darks > frame) {
-            Some((frame, darks)) => Some(Misfit::Step([frame, darks])),
+        let steps = frame.zip(darks);
+        match steps.filter(|(frame, darks)| darks > frame || self.is_shifted(*frame, *darks)) {
+            Some((frame, darks)) if darks > frame => Some(Misfit::Step([frame, darks])),
+            Some((frame, darks)) => Some(Misfit::Shifted([frame, darks])),
             None if below >= SPOT && self.below >= LEAST => Some(Misfit::Below(below)),
             None if scatters >= SPOTS && self.scattering[1] >= LEAST => Some(Misfit::Scatters(scatters)),
             None => None,

@@ -111,6 +111,21 @@ impl<S: RowSource> DarkFrames<S> {
         (self.summed > 0).then(|| self.sums.map(|sum| sum / self.summed as f64))
     }
 
+    /// The mean of what was read of frames of a kind so far, and the name of the first; none of none.
+    pub fn mean_of(&self, kind: MasterKind) -> Option<(&str, f64)> {
+        let of_kind = self.masters.iter().zip(&self.stack.masters).filter(|(_, master)| master.record.kind == kind);
+        of_kind.filter_map(|(frames, _)| Some((frames.frames().next()?.header().name.as_str(), frames.level()?))).next()
+    }
+
+    /// The mean of what came off so far, by those of the frames; none where a level counts with them.
+    pub fn mean(&self) -> Option<f64> {
+        let sum = || {
+            let averages = self.masters.iter().zip(&self.stack.masters);
+            averages.map(|(frames, master)| Some(master.record.weight * frames.level()?)).sum()
+        };
+        self.stack.level.is_none().then(sum).flatten()
+    }
+
     /// A frame that counts as one with others whose mean is another than theirs, its mean, and the median of all.
     pub fn unlike(&self) -> Option<(&str, [f64; 2])> {
         self.masters.iter().find_map(Frames::unlike)

@@ -1,4 +1,4 @@
-//! Sums over the photosites of flats.
+//! What a first reading of flats adds up over their photosites.
 
 use crate::cfa::Places;
 use std::f64::consts::PI;

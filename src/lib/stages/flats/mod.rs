@@ -12,7 +12,7 @@ use crate::camera::levels::BlackLevels;
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, MasterNoise, Scene};
-use crate::stages::darks::{DarkFrames, DarkSettings, check_alike, check_codes, check_setting};
+use crate::stages::darks::{DarkFrames, DarkSettings, Fitness, Misfit, check_alike, check_codes, check_setting};
 use crate::stages::defects::{DefectMap, Survey, add};
 use crate::stages::masters::Frames;
 use crate::stages::saturation::{DEFECTIVE, FullLevels, SATURATED};
@@ -43,6 +43,8 @@ pub struct FlatFrames<S> {
     passages: Vec<Passage<Transfer>>,
     rows_made: usize,
     made: Vec<f64>,
+    /// How what comes off goes with the flats.
+    fitness: Fitness,
     warnings: Vec<String>,
 }
 
@@ -145,6 +147,7 @@ impl<S: RowSource> FlatFrames<S> {
             passages,
             rows_made: 0,
             made,
+            fitness: Fitness::default(),
             warnings,
         }))
     }
@@ -156,19 +159,35 @@ impl<S: RowSource> FlatFrames<S> {
 
     /// Each of the frames: flats, then what comes off them.
     pub fn frames(&self) -> impl Iterator<Item = &S> {
-        let darks = if let Pedestal::Frames(darks) = &self.pedestal { Some(darks.as_ref()) } else { None };
-        self.frames.frames().chain(darks.into_iter().flat_map(DarkFrames::frames))
+        self.frames.frames().chain(self.darks().into_iter().flat_map(DarkFrames::frames))
     }
 
-    /// A frame among what comes off them whose mean is another than that of those which it counts as one with.
-    pub fn unlike_dark(&self) -> Option<(&str, [f64; 2])> {
-        if let Pedestal::Frames(darks) = &self.pedestal { darks.unlike() } else { None }
+    /// What comes off them, where that is frames.
+    pub fn darks(&self) -> Option<&DarkFrames<S>> {
+        if let Pedestal::Frames(darks) = &self.pedestal { Some(darks.as_ref()) } else { None }
+    }
+
+    /// What they are called: the name of the first, or of their average.
+    pub fn name(&self) -> &str {
+        &self.head.name
+    }
+
+    /// The head of the flats, with the sensor of the frame that they are for where theirs names none.
+    pub fn head_beside(&self, frame: &FrameHeader) -> FrameHeader {
+        of_sensor(&self.head, frame)
+    }
+
+    /// In which share of the flats their mean is below that of what came off, so far; none where that is a spot.
+    pub fn below_darks(&self) -> Option<f64> {
+        match self.fitness.misfit() {
+            Some(Misfit::Below(share)) => Some(share),
+            _ => None,
+        }
     }
 
     /// Samples of theirs that were clipped so far.
     pub fn clipped(&self) -> u64 {
-        let of_darks = if let Pedestal::Frames(darks) = &self.pedestal { darks.clipped() } else { 0 };
-        self.frames.clipped() + of_darks
+        self.frames.clipped() + self.darks().map_or(0, DarkFrames::clipped)
     }
 
     /// Makes F of the next rows.
@@ -178,6 +197,12 @@ impl<S: RowSource> FlatFrames<S> {
         match &mut self.pedestal {
             Pedestal::Frames(darks) => {
                 let darks = darks.next(rows)?;
+                let lines = self.made.chunks_exact(width).zip(darks.chunks_exact(width)).enumerate();
+                for (_, (flat, dark)) in lines.filter(|(index, _)| Fitness::looks_at(self.rows_made + index / planes)) {
+                    let flat: Vec<f32> = flat.iter().map(|sample| to_sample(*sample)).collect();
+                    // Averages of any number scatter by less than one dark frame.
+                    self.fitness.take(&flat, dark, None);
+                }
                 self.made.iter_mut().zip(darks).for_each(|(flat, dark)| *flat -= dark);
             }
             Pedestal::Level(level) => {
