@@ -305,7 +305,11 @@ pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
             Ok((CameraMatrix::relative(relative, frame.metadata.camera.as_deref()), Note::Warning(note)))
         }
         (_, None) => {
-            let problem = format!("{}: neither its sensor nor its raw file tells a matrix", frame.name);
+            let mut problem = format!("{}: neither its sensor nor its raw file tells a matrix", frame.name);
+            if sensor.is_none() {
+                problem += "; of a DNG with a ColorMatrix1 and no white of its exposure (AsShotNeutral) \
+                            `fit-matrix --from-raw FILE.dng --illuminant d65 -o m.yaml` makes one";
+            }
             Err(Error::Usage(problem).give(&["matrix"]))
         }
     }
