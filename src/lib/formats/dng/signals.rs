@@ -88,7 +88,10 @@ pub(super) fn doubt_of_colors(metadata: &Metadata) -> Option<String> {
             };
             format!("the sensor {} tells no matrix; its file takes one, `xyz_from_camera`, {by}", sensor.name)
         }
-        None => "neither a sensor nor a raw file tells a matrix; a sensor file with `xyz_from_camera` does".into(),
+        None => {
+            "neither a sensor nor a raw file tells a matrix; a sensor file with `xyz_from_camera` does, or metadata with `relative_matrix`"
+                .into()
+        }
     };
     Some(format!(
         "the DNG has no colors (ColorMatrix1, AsShotNeutral), of which raw converters make gray, NaN or nothing: {why}"
