@@ -8,7 +8,7 @@ mod support;
 use cyanometer::analysis::statistics::{Report, Saturated, measure};
 use cyanometer::camera::levels::{BlackLevel, WhiteLevel};
 use cyanometer::cfa::{CfaPattern, Class, FilterArray};
-use cyanometer::color::{Space, White};
+use cyanometer::color::{Space, White, matrix};
 use cyanometer::error::Result;
 use cyanometer::formats::picture::{PictureSettings, write_png};
 use cyanometer::formats::yaml::{parse_metadata, write_metadata};
@@ -26,6 +26,7 @@ use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::{MemoryFrame, Stage};
 use cyanometer::units::QuantityKind;
+use nalgebra::Vector3;
 use support::*;
 
 /// None of them a 32-bit float.
@@ -290,9 +291,11 @@ fn white_follows_what_is_subtracted_from_its_class() {
     let camera = Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None).unwrap();
     assert_eq!(camera.header().metadata.white_level_adu, Some(WhiteLevel::Classes([900.0, 1900.0, 2900.0])));
     let lab = ToXyz::new(camera.header(), &to_color(Space::Lab)).unwrap();
-    let [x, y, z] = sensor().xyz_from_camera.unwrap()[1];
-    let luminance = (x * 900.0 + y * 1900.0 + z * 2900.0) / EXPOSURE.exposure_s_sr();
-    assert!((lab.white()[1] / luminance - 1.0).abs() < 1e-12);
+    // By the white one class is full, and no other beyond it.
+    let inverse = matrix(&sensor().xyz_from_camera.unwrap()).try_inverse().unwrap();
+    let signals = inverse * Vector3::from(lab.white()) * EXPOSURE.exposure_s_sr();
+    let fullest = (0..3).map(|k| signals[k] / [900.0, 1900.0, 2900.0][k]).fold(0.0, f64::max);
+    assert!((fullest - 1.0).abs() < 1e-12, "{signals}");
     let mut x_trans = plane(12, 8, X_TRANS.parse().unwrap());
     x_trans.header.metadata.white_level_adu = Some(4095.0.into());
     x_trans.header.metadata.black_level_adu = Some(BlackLevel::Sites(SITES));

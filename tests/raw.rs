@@ -204,6 +204,47 @@ fn mistakes_with_raws_are_told() {
     }
 }
 
+/// A white level above the largest code marks no sample as saturated; that code itself, or a level below, does.
+#[test]
+fn a_white_level_that_no_code_reaches_is_told() {
+    let shop = Workshop::new();
+    let said = |bits: u32, more: &[(u16, &[u32])]| {
+        let strip = vec![1; 12 * 10 * bits as usize / 8];
+        fs::write(shop.path("raw.dng"), dng([12, 10], bits, 1, &strip, more)).unwrap();
+        shop.said("import-raw raw.dng -o plane.exr", 0)
+    };
+    for (bits, white) in [(12, 4095), (12, 3900), (16, 65_535)] {
+        assert_eq!(said(bits, &[(50714, &[64]), (50717, &[white])]), "", "{bits} {white}");
+    }
+    for (bits, white, largest) in [(12, 16_383, 4095), (16, 70_000, 65_535)] {
+        let warning = format!(
+            "import-raw: warning: raw.dng: its WhiteLevel, {white}, lies above the largest code of {bits} bits, {largest}: no sample \
+             counts as saturated; correct its tags\n"
+        );
+        assert_eq!(said(bits, &[(50714, &[64]), (50717, &[white])]), warning);
+    }
+}
+
+/// A DNG of a sensor without a matrix has no colors: it is said once, and not of darks.
+#[test]
+fn a_dng_without_colors_is_told() {
+    let shop = Workshop::new();
+    shop.pipe("render-radiance --electrons 900,1500,1200 --size 8x6 | mosaic | add-noise -o lit.exr");
+    shop.pipe("render-radiance --dark --size 8x6 | mosaic | add-noise -o dark.exr");
+    assert_eq!(shop.said("digitize lit.exr -o out.dng", 0), "");
+    for name in ["lit.exr", "dark.exr"] {
+        let mut frame = shop.frame(name);
+        frame.header.metadata.sensor.as_mut().unwrap().xyz_from_camera = None;
+        shop.write(name, &frame.header, &frame.samples);
+    }
+    fs::copy(shop.path("lit.exr"), shop.path("more.exr")).unwrap();
+    let said = shop.said("digitize lit.exr more.exr -o {stem}.dng", 0);
+    assert!(said.starts_with("digitize: warning: the DNG has no colors (ColorMatrix1, AsShotNeutral)"), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert_eq!(shop.said("digitize dark.exr -o out.dng", 0), "");
+    assert_eq!(shop.said("digitize lit.exr -o out.tiff", 0), "");
+}
+
 /// Ratios as numbers of 32 bits.
 fn ratios(numbers: &[u32]) -> Vec<u32> {
     numbers.iter().flat_map(|number| [*number, 10_000]).collect()
@@ -249,7 +290,8 @@ fn a_raw_brings_its_matrix_along() {
         (
             "to-xyz none.exr -o x.exr",
             BAD_USAGE,
-            "to-xyz: none.exr: neither its sensor nor its raw file tells a matrix; give --matrix\n",
+            "to-xyz: none.exr: neither its sensor nor its raw file tells a matrix; of a DNG with a ColorMatrix1 and no white of its \
+             exposure (AsShotNeutral) `fit-matrix --from-raw FILE.dng --illuminant d65 -o m.yaml` makes one; give --matrix\n",
         ),
         (
             "import-raw raw.dng -o x.exr --write-matrix x.yaml",

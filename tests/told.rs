@@ -351,7 +351,9 @@ fn bare_frames_are_described() {
         shop.said(three, BAD_DATA),
         "mosaic: three.exr: the metadata has no `black_level_adu`; give --black N, 0 where it is off already\n"
     );
-    shop.run(&format!("{three} --black 64"), &[]);
+    let colorless = shop.said(&format!("{three} --black 64"), 0);
+    assert!(colorless.starts_with("mosaic: warning: the DNG has no colors"), "{colorless}");
+    assert_eq!(colorless.lines().count(), 1);
 }
 
 #[test]

@@ -9,6 +9,7 @@ pub mod locus;
 pub mod luv;
 pub mod ramp;
 pub mod rgb;
+pub mod saturation;
 pub mod temperature;
 pub mod upsampling;
 

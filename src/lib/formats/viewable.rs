@@ -17,7 +17,7 @@ const LARGEST_EXPONENT: i32 = 60;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Scaling {
     width: usize,
-    /// Of each channel, a power of two.
+    /// Of each channel: a power of two, but of another program's files.
     factors: Vec<f32>,
 }
 

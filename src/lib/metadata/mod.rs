@@ -246,7 +246,9 @@ impl Metadata {
 
     /// Whether its colors are on the scale of relative XYZ.
     pub fn is_relative(&self) -> bool {
-        self.color.as_ref().is_some_and(ColorRecord::is_relative)
+        let relative = self.quantity.relative_unit();
+        let is_named = relative != self.quantity.unit() && self.unit == relative;
+        is_named || self.color.as_ref().is_some_and(ColorRecord::is_relative)
     }
 
     /// What its camera is called: by its sensor, and by its raw file.

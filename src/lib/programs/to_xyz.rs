@@ -15,7 +15,7 @@ use std::process::ExitCode;
 ///
 /// XYZ is absolute, Y in cd/m2, or, by a matrix that says so, relative: Y = 1 for the white by which the first class reaches
 /// its white level, whatever the exposure. L*a*b*, L*u*v* and sRGB refer to a white; by default that of D65, as bright as
-/// makes the camera saturate. Colors are those under the light of the scene, unless --adapt-to names another.
+/// makes the first class reach its white level. Colors are those under the light of the scene, unless --adapt-to names another.
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {

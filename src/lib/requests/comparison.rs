@@ -10,9 +10,8 @@ use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::pipe;
 use crate::formats::register::check_inputs;
-use crate::metadata::{FrameHeader, Metadata};
+use crate::metadata::FrameHeader;
 use crate::stream::RowSource;
-use crate::units::RELATIVE_UNIT;
 use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use std::ffi::OsString;
@@ -129,8 +128,7 @@ impl ColorPair {
             let text = "both are L*a*b* already; --white and --white-luminance have no effect";
             notes.push(Note::Warning(text.into()));
         }
-        let is_relative = |metadata: &Metadata| metadata.is_relative() || metadata.unit == RELATIVE_UNIT;
-        let is_relative = comparison.frames().any(|frame| is_relative(&frame.header().metadata));
+        let is_relative = comparison.frames().any(|frame| frame.header().metadata.is_relative());
         // Colors that are given have no scale that is known.
         let is_of_frames = comparison.frames().next().is_some();
         notes.extend(white.filter(|_| is_of_frames).and_then(|white| doubt_of_white(white, is_relative)));

@@ -14,7 +14,7 @@ use crate::formats::input::FrameReader;
 use crate::metadata::{FrameHeader, Metadata};
 use crate::names::Named;
 use crate::stages::from_xyz::{Adapting, COVARIANCE_LAYER, FromXyz, XyzSettings, layers_of, scene_white};
-use crate::stages::to_xyz::{ColorSettings, ToXyz};
+use crate::stages::to_xyz::{ColorSettings, ToXyz, needs_white};
 use crate::stream::RowSource;
 use crate::units::{QuantityKind, RELATIVE_UNIT};
 use clap::Args;
@@ -132,6 +132,7 @@ impl Conversion {
             record.scene_error = scene_error;
             notes.extend(self.doubt_of_light(record.scene_white_xy));
         }
+        notes.extend(self.doubt_of_brightness(&stage));
         Ok((stage, notes))
     }
 
@@ -183,8 +184,7 @@ impl Conversion {
     fn doubt_of_light(&self, light_xy: Option<[f64; 2]>) -> Option<Note> {
         /// Chromaticities that are nearer are those of one light.
         const NEAR: f64 = 0.005;
-        let needs_white = matches!(self.space, Space::Lab | Space::Luv | Space::Srgb | Space::LinearSrgb);
-        let [x, y] = light_xy.filter(|_| needs_white)?;
+        let [x, y] = light_xy.filter(|_| needs_white(self.space))?;
         let white = color::chromaticity(self.white.white.xyz(1.0));
         let is_far = (x - white[0]).abs().max((y - white[1]).abs()) > NEAR;
         is_far.then(|| {
@@ -194,6 +194,17 @@ impl Conversion {
             );
             Note::Remark(text)
         })
+    }
+
+    /// What to say where the matrix does not tell how bright the white is by which the camera saturates.
+    fn doubt_of_brightness(&self, stage: &ToXyz) -> Option<Note> {
+        let [_, luminance, _] = stage.white_stands_in().then(|| stage.white())?;
+        let text = format!(
+            "by the matrix the white {} has no signal in one of the classes; its luminance is that of equal signals that saturate, \
+             {luminance:.4} cd/m2: --white-luminance says another",
+            self.white.white
+        );
+        Some(if needs_white(self.space) { Note::Warning(text) } else { Note::Remark(text) })
     }
 
     /// The adaptation that is asked for, from the light that is given or known.
@@ -294,7 +305,11 @@ pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
             Ok((CameraMatrix::relative(relative, frame.metadata.camera.as_deref()), Note::Warning(note)))
         }
         (_, None) => {
-            let problem = format!("{}: neither its sensor nor its raw file tells a matrix", frame.name);
+            let mut problem = format!("{}: neither its sensor nor its raw file tells a matrix", frame.name);
+            if sensor.is_none() {
+                problem += "; of a DNG with a ColorMatrix1 and no white of its exposure (AsShotNeutral) \
+                            `fit-matrix --from-raw FILE.dng --illuminant d65 -o m.yaml` makes one";
+            }
             Err(Error::Usage(problem).give(&["matrix"]))
         }
     }

@@ -180,7 +180,10 @@ fn reference_white(input: &FrameHeader, settings: &XyzSettings) -> Result<[f64; 
     let metadata = &input.metadata;
     let is_relative = metadata.unit == RELATIVE_UNIT;
     if is_relative && settings.white_luminance.is_some() {
-        let problem = "its XYZ are relative: the white has Y = 1 and no luminance in cd/m2";
+        let mut problem = "its XYZ are relative: the white has Y = 1 and no luminance in cd/m2".to_owned();
+        if metadata.history.is_empty() {
+            problem += ", unless metadata with `unit: cd m-2` say otherwise";
+        }
         return Err(input.refuse(problem).leave_out(&["white_luminance"]));
     }
     let recorded = || metadata.color.as_ref().and_then(|color| color.white).map(|white| white[1]);

@@ -1,6 +1,7 @@
 //! From demosaicked ADU to CIE XYZ and on to xyY, L*a*b*, L*u*v*, color temperatures and sRGB.
 
 use crate::color::coordinates::Coordinates;
+use crate::color::saturation::Saturation;
 use crate::color::temperature::Locus;
 use crate::color::{Space, White, rows_of};
 use crate::error::{Error, Result};
@@ -28,7 +29,7 @@ pub struct ColorSettings {
     pub space: Space,
     /// The white of L*a*b* and sRGB.
     pub white: White,
-    /// Luminance of a white that is given by its chromaticity, cd m⁻²; that at which the camera saturates where none is
+    /// Luminance of a white that is given by its chromaticity, cd m⁻²; that by which the first class saturates where none is
     /// given. Of relative XYZ it is 1, and none can be given.
     pub white_luminance: Option<f64>,
 }
@@ -81,6 +82,8 @@ pub struct ToXyz {
     /// XYZ from ADU above black, the exposure or the range of codes included.
     xyz_from_adu: Matrix3<f64>,
     black: f64,
+    /// Whether the luminance of its white is that of equal signals.
+    white_stands_in: bool,
 }
 
 impl ToXyz {
@@ -120,7 +123,8 @@ impl ToXyz {
         };
         let scaled = record.xyz_from_adu(input.metadata.exposure);
         let xyz_from_adu = scaled.ok_or_else(|| input.missing("exposure"))?;
-        record.white = reference_white(input, settings, &xyz_from_adu, black)?;
+        let (white, white_stands_in) = reference_white(input, settings, &xyz_from_adu, black)?;
+        record.white = white;
         let Some(white) = record.white.or_else(|| (!needs_white(settings.space)).then(|| settings.white.xyz(1.0)))
         else {
             return Err(input.missing("white_level_adu"));
@@ -137,7 +141,7 @@ impl ToXyz {
         let geometry = input.geometry.with_channels(&channels);
         let header = FrameHeader { name: input.name.clone(), geometry, metadata };
         let coordinates = Coordinates::new(settings.space, white, locus);
-        Ok(Self { header, coordinates, xyz_from_adu, black })
+        Ok(Self { header, coordinates, xyz_from_adu, black, white_stands_in })
     }
 
     /// The space of the converted frame.
@@ -148,6 +152,12 @@ impl ToXyz {
     /// XYZ of the white that L*a*b*, L*u*v* and sRGB refer to.
     pub fn white(&self) -> [f64; 3] {
         self.coordinates.white()
+    }
+
+    /// Whether the luminance of the white is that of all classes at the end of their range, for the matrix tells none of the
+    /// white itself.
+    pub fn white_stands_in(&self) -> bool {
+        self.white_stands_in
     }
 
     /// From XYZ to the coordinates of its space.
@@ -226,7 +236,7 @@ pub(super) fn planes_of(space: Space) -> (QuantityKind, [&'static str; 3]) {
 }
 
 /// Whether the colors of a space hang on a white.
-pub(super) fn needs_white(space: Space) -> bool {
+pub fn needs_white(space: Space) -> bool {
     matches!(space, Space::Lab | Space::Luv | Space::Srgb | Space::LinearSrgb)
 }
 
@@ -239,46 +249,46 @@ pub(super) fn check_white(space: Space, white: [f64; 3]) -> Result<()> {
     Err(Error::Usage(format!("a white of XYZ {x:.6} {y:.6} {z:.6} is impossible; all three must be above 0")))
 }
 
-/// XYZ of the white that colors refer to; none where its luminance is that at which the camera saturates, and the white
-/// level is unknown.
+/// XYZ of the white that colors refer to, and whether equal signals tell its luminance; none where it is that by which the
+/// camera saturates, and the white level is unknown.
 fn reference_white(
     input: &FrameHeader,
     settings: &ColorSettings,
     xyz_from_adu: &Matrix3<f64>,
     black: f64,
-) -> Result<Option<[f64; 3]>> {
+) -> Result<(Option<[f64; 3]>, bool)> {
     if settings.is_relative && settings.white_luminance.is_some() {
         let problem = "the matrix gives relative XYZ, in which the white has Y = 1 and no luminance in cd/m2";
         return Err(Error::Usage(format!("{}: {problem}", input.name)).leave_out(&["white_luminance"]));
     }
     if let White::Absolute(white) = settings.white {
-        return Ok(Some(white));
+        return Ok((Some(white), false));
     }
     if settings.is_relative {
-        return Ok(Some(settings.white.xyz(1.0)));
+        return Ok((Some(settings.white.xyz(1.0)), false));
     }
-    let at_saturation = || -> Option<f64> {
-        let range = input.metadata.white_level_adu?.less([black; 3]).classes();
-        Some((xyz_from_adu * Vector3::from(range)).y)
-    };
-    let luminance = match (settings.white_luminance, at_saturation()) {
-        (Some(luminance), _) => Some(luminance),
-        // Without light codes are at their end already: no white saturates the camera.
-        (None, Some(luminance)) if luminance <= 0.0 => {
-            if !needs_white(settings.space) {
-                return Ok(None);
-            }
-            let white = input.metadata.white_level_adu.map_or(f64::NAN, |white| white.range_above(0.0));
-            let [black, white] = [black, white].map(|level| in_decimals(level, 1));
-            let problem = format!(
-                "its black level, {black} ADU, is no less than its white level, {white} ADU: no white saturates the camera, and \
-                 none is named; expose for a shorter time"
-            );
-            return Err(input.refuse(problem).give(&["white_luminance"]));
-        }
-        (None, luminance) => luminance,
-    };
-    Ok(luminance.map(|luminance| settings.white.xyz(luminance)))
+    if let Some(luminance) = settings.white_luminance {
+        return Ok((Some(settings.white.xyz(luminance)), false));
+    }
+    let Some(level) = input.metadata.white_level_adu else { return Ok((None, false)) };
+    let saturation = Saturation::of(xyz_from_adu, level.less([black; 3]).classes(), settings.white.xyz(1.0));
+    if saturation.luminance > 0.0 {
+        return Ok((Some(settings.white.xyz(saturation.luminance)), !saturation.is_of_white));
+    }
+    if !needs_white(settings.space) {
+        return Ok((None, false));
+    }
+    if level.range_above(black) > 0.0 {
+        let problem = "its matrix tells no white by which the camera saturates, and none is named";
+        return Err(input.refuse(problem).give(&["white_luminance"]));
+    }
+    // Without light codes are at their end already.
+    let [black, white] = [black, level.range_above(0.0)].map(|level| in_decimals(level, 1));
+    let problem = format!(
+        "its black level, {black} ADU, is no less than its white level, {white} ADU: no white saturates the camera, and \
+         none is named; expose for a shorter time"
+    );
+    Err(input.refuse(problem).give(&["white_luminance"]))
 }
 
 /// White level less black level, for R, G and B.

@@ -133,6 +133,7 @@ pub(super) fn white(
         let unknown = (0..2).find_map(|i| headers[i].filter(|_| !is_lab[i]));
         match (settings.white_luminance.or(known.map(|white| white[1])), unknown) {
             (Some(luminance), _) => Ok(luminance),
+            (None, Some(frame)) if frame.metadata.is_relative() => Ok(1.0),
             (None, Some(frame)) => Err(frame.missing("color.white")),
             (None, None) => Ok(NUMBERS_WHITE_LUMINANCE),
         }

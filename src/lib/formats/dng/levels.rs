@@ -62,6 +62,22 @@ impl Levels {
             table: table(file, image, sample)?,
         })
     }
+
+    /// A doubt of a white level that no sample reaches, so that none counts as saturated. Floats have no largest.
+    pub fn doubt_of_white(&self, sample: Sample) -> Option<String> {
+        let Sample::Integer { bits } = sample else { return None };
+        let (largest, of) = match self.table.as_ref().and_then(|table| table.iter().copied().reduce(f32::max)) {
+            Some(largest) => (f64::from(largest), "its LinearizationTable".to_owned()),
+            None => (sample.largest(), format!("{bits} bits")),
+        };
+        (self.white > largest).then(|| {
+            format!(
+                "its WhiteLevel, {}, lies above the largest code of {of}, {largest}: no sample counts as saturated; correct its \
+                 tags",
+                self.white
+            )
+        })
+    }
 }
 
 /// The black level by the sites at the sensor's corner.

@@ -100,6 +100,9 @@ impl DngReader {
         if let Some(doubt) = describe::doubt_of_black(&image, active).filter(|_| !is_ours) {
             register::doubt(format!("{name}: {doubt}"));
         }
+        if let Some(doubt) = levels.doubt_of_white(storage.sample).filter(|_| !is_ours) {
+            register::doubt(format!("{name}: {doubt}"));
+        }
         if part == RawArea::Full {
             own_tags.masked_areas = area::masked(&mut file, &image, active, place)?;
         }

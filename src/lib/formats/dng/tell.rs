@@ -4,7 +4,7 @@ use super::image::{CFA, LINEAR_RAW};
 use super::noise;
 use super::preview::Preview;
 use super::ratio::{ratio, signed};
-use super::signals::CameraColor;
+use super::signals::{CameraColor, doubt_of_colors};
 use super::tags;
 use crate::camera::levels::{BlackLevels, WhiteLevel};
 use crate::cfa::{FILTERS, FilterArray};
@@ -39,6 +39,8 @@ pub(super) struct Told {
     pub photometric: u16,
     /// The picture, without rows yet.
     pub preview: Preview,
+    /// What to warn of.
+    pub doubt: Option<String>,
 }
 
 impl Told {
@@ -80,6 +82,7 @@ impl Told {
             first: of_file(metadata, samples, color.as_ref()),
             exif: of_exposure(metadata),
             photometric: if cfa == FilterArray::Monochrome { LINEAR_RAW } else { CFA },
+            doubt: doubt_of_colors(metadata).filter(|_| color.is_none() && cfa.has_three_classes()),
             preview: Preview::new(geometry, cfa, stored, range * scale, color),
         })
     }

@@ -5,6 +5,7 @@ use super::preview::Preview;
 use super::tags;
 use super::tell::Told;
 use crate::error::{Error, Result};
+use crate::formats::register;
 use crate::formats::tiff::{
     ExtraTag, FirstImage, TagValue, TiffCompression, TiffSamples, TiffSettings, TiffTags, TiffWriter,
 };
@@ -80,7 +81,9 @@ impl<W: Write + Seek> DngWriter<W> {
         compression: TiffCompression,
         [description, software]: [String; 2],
     ) -> Result<Self> {
-        let Told { raw, first, exif, photometric, preview } = Told::of(header, name, samples)?;
+        let Told { raw, first, exif, photometric, preview, doubt } = Told::of(header, name, samples)?;
+        // Of several files it is said once: it is the same of all.
+        doubt.into_iter().for_each(register::doubt);
         let settings =
             TiffSettings { samples, scale: 1.0, compression, tags: TiffTags::default(), extra: raw, exif: Vec::new() };
         let mut tiff = TiffWriter::create(output, name, &header.geometry, settings)?;

@@ -5,6 +5,7 @@ use super::{DngReader, DngWriter, RawArea, check_frame};
 use crate::camera::levels::{BlackLevel, WhiteLevel};
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::tests::kaf5101ce;
+use crate::color::D65_XY;
 use crate::error::Result;
 use crate::formats::format::SampleReader;
 use crate::formats::tiff::{Directory, TiffCompression, TiffFile, TiffSamples};
@@ -270,7 +271,7 @@ fn colors_and_places_are_told() {
     let header = frame([7, 5], [1, 2], "rggb");
     let (mut file, first, raw) = directories(&bytes(&header, &codes(&header), PLAIN, 4).unwrap());
     let mut of_file = |tag| numbers(&mut file, &first, tag);
-    let color = super::signals::CameraColor::of(&XYZ_FROM_CAMERA, crate::color::D65_XY, tags::D65).unwrap();
+    let color = super::signals::CameraColor::of(&XYZ_FROM_CAMERA, (D65_XY, tags::D65), D65_XY).unwrap();
     let near = |found: &[f64], expected: &[f64]| found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-8);
     assert!(near(&of_file(tags::COLOR_MATRIX_1), color.camera_from_xyz.as_flattened()));
     assert!(near(&of_file(tags::AS_SHOT_NEUTRAL), &color.neutral));

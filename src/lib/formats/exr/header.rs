@@ -9,7 +9,7 @@ use crate::frame::{Geometry, THREE_PLANES, bare_name};
 use crate::metadata::Metadata;
 use crate::spectrum::channel_wavelength_nm;
 use crate::stages::saturation::MASK_LAYER;
-use crate::units::QuantityKind;
+use crate::units::{QuantityKind, RELATIVE_UNIT};
 use exr::compression::Compression;
 use exr::math::Vec2;
 use exr::meta::MetaData;
@@ -107,6 +107,19 @@ fn own_tags(tags: &ExrTags, geometry: &Geometry, notes: &mut Vec<String>) -> Met
     });
     if is_spectral {
         metadata.unit = emissive_unit(tags);
+    }
+    if metadata.quantity == QuantityKind::Xyz {
+        // Samples are shares of the luminance of R = G = B = 1 \[OpenEXR, whiteLuminance].
+        match tags.white_luminance.filter(|luminance| *luminance > 0.0 && luminance.is_finite()) {
+            Some(luminance) => metadata.sample_scale = Some(luminance.recip()).filter(|scale| *scale != 1.0),
+            None => {
+                metadata.unit = RELATIVE_UNIT.into();
+                notes.push(
+                    "it has no whiteLuminance: its XYZ count as relative, Y = 1 for white; metadata with `unit: cd m-2` say otherwise"
+                        .into(),
+                );
+            }
+        }
     }
     metadata.iso_speed = tags.iso_speed.filter(|iso| *iso > 0.0 && iso.is_finite());
     let is_time = |time_s: &f64| *time_s > 0.0 && time_s.is_finite();
@@ -231,6 +244,23 @@ pub(super) fn canonical_order(names: &[String]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// XYZ are shares of the luminance of white, and on no scale where nothing tells it.
+    #[test]
+    fn xyz_are_absolute_where_their_white_is() {
+        let told = |white_luminance: Option<f64>| {
+            let tags = ExrTags { white_luminance, primaries: Some(XYZ_PRIMARIES), ..ExrTags::default() };
+            let mut notes = Vec::new();
+            let own = own_tags(&tags, &Geometry::new(1, 1, &["R", "G", "B"]), &mut notes);
+            (own.unit, own.sample_scale, notes.len())
+        };
+        let absolute = QuantityKind::Xyz.unit().to_owned();
+        assert_eq!(told(Some(1.0)), (absolute.clone(), None, 0));
+        assert_eq!(told(Some(80.0)), (absolute, Some(0.0125), 0));
+        for nothing in [None, Some(0.0), Some(-3.0), Some(f64::NAN), Some(f64::INFINITY)] {
+            assert_eq!(told(nothing), (RELATIVE_UNIT.to_owned(), None, 1));
+        }
+    }
 
     /// What pbrt-v4 writes is per nm, as the layout has it; without the layout nobody knows.
     #[test]

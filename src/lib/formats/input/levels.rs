@@ -184,7 +184,8 @@ fn sample_beyond(wrong: f64, [low, high]: [f64; 2]) -> String {
     let [from, to] = [low, high].map(|adu| in_decimals(adu, 1));
     let range = match low.is_finite() {
         true => format!("codes less what came off are {from} to {to} ADU"),
-        false => format!("codes less what came off are {to} ADU at most"),
+        // No converter tells where codes end then.
+        false => format!("{OF_ONE_SCALE} times its white level, less what came off, are {to} ADU"),
     };
     format!("it has a sample of {wrong}, and {range}")
 }

@@ -8,7 +8,7 @@ use crate::formats::files::{read_file, sidecar_path};
 use crate::formats::format::SampleReader;
 use crate::formats::viewable::{Scaling, is_scale};
 use crate::formats::{register, yaml, yaml_guard};
-use crate::frame::Geometry;
+use crate::frame::{Geometry, to_sample};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::stages::saturation::{MASK_LAYER, untold};
 use crate::units::QuantityKind;
@@ -246,7 +246,7 @@ fn doubt_of_metadata(name: &str, problems: impl IntoIterator<Item = String>) {
 ///
 /// # Errors
 ///
-/// [`Error::Format`] for what is no power of two.
+/// [`Error::Format`] for what is no power of two, but by tags of another program.
 pub(super) fn take_scaling(
     reader: &dyn SampleReader,
     metadata: &mut Metadata,
@@ -259,7 +259,10 @@ pub(super) fn take_scaling(
         .filter(|_| *found_in != FoundIn::Embedded)
         .and_then(|text| yaml::parse_metadata(name, text).ok());
     let scale = embedded.map_or(found, |embedded| embedded.sample_scale).unwrap_or(1.0);
-    if !is_scale(scale) {
+    // Those of other programs are no powers of two.
+    let is_fine =
+        if *found_in == FoundIn::Tags { scale > 0.0 && to_sample(scale).is_normal() } else { is_scale(scale) };
+    if !is_fine {
         let problem = format!("its `sample_scale`, {scale}, is no power of two, as 0.25 and 16 are");
         return Err(Error::format(name, problem));
     }

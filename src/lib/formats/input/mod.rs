@@ -504,6 +504,7 @@ mod tests {
     use super::*;
     use crate::analysis::statistics::Region;
     use crate::camera::levels::BlackLevel;
+    use crate::formats::exr::{ExrCompression, ExrSamples, ExrTags, ExrWriter, Layers, XYZ_PRIMARIES};
     use crate::formats::output::{FrameWriter, OutputOptions};
     use crate::metadata::Metadata;
     use crate::stream::{Counts, RowSink};
@@ -535,6 +536,31 @@ mod tests {
             reader.read(1, &mut samples)?;
         }
         Ok((reader, samples))
+    }
+
+    /// XYZ of another program are shares of the luminance of white, covariances of its square; where nothing tells it they stay.
+    #[test]
+    fn xyz_of_another_program_are_scaled_by_their_white() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("xyz.exr");
+        let geometry = Geometry::new(1, 1, &["R", "G", "B", "covariance.XX"]);
+        for (white_luminance, wanted, unit) in
+            [(Some(80.0), [20.0_f32, 40.0, 80.0, 6400.0], "cd m-2"), (None, [0.25, 0.5, 1.0, 1.0], "relative")]
+        {
+            let primaries = Some(XYZ_PRIMARIES);
+            let tags = ExrTags { white_luminance, primaries, ..ExrTags::default() };
+            let (kind, beside) = (ExrSamples::F32, Layers::BesideTheImage);
+            let none = ExrCompression::None;
+            let mut writer = ExrWriter::create(Vec::new(), "xyz.exr", &geometry, kind, none, beside, &tags).unwrap();
+            writer.write(&[0.25, 0.5, 1.0, 1.0]).unwrap();
+            std::fs::write(&path, writer.finish().unwrap().0).unwrap();
+            let options = InputOptions { path: Some(path.clone()), all_channels: true, ..InputOptions::default() };
+            let (reader, samples) = read(&options).unwrap();
+            // The scale and its inverse are rounded once each.
+            assert!(samples.iter().zip(wanted).all(|(a, b)| (a - b).abs() <= 3.0 * f32::EPSILON * b), "{samples:?}");
+            assert_eq!(reader.header().metadata.unit, unit);
+            assert_eq!(reader.notes().len(), usize::from(white_luminance.is_none()));
+        }
     }
 
     #[test]

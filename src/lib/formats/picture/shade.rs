@@ -94,8 +94,7 @@ impl Shade {
                 );
             }
             QuantityKind::Xyz => {
-                let white = metadata.color.as_ref().and_then(|color| color.white);
-                let white = white.ok_or_else(|| {
+                let white = white_of(frame).ok_or_else(|| {
                     frame.refuse(
                         "the metadata name no white; give --range LOW,HIGH, or make it anew with `to-xyz \
                          --white-luminance CD_PER_M2`",
@@ -235,6 +234,12 @@ impl Shade {
     }
 }
 
+/// The white that a frame of XYZ names; of relative XYZ that name none, D65 of Y = 1.
+fn white_of(frame: &FrameHeader) -> Option<[f64; 3]> {
+    let named = frame.metadata.color.as_ref().and_then(|color| color.white);
+    named.or_else(|| frame.metadata.is_relative().then(|| xyz_of_chromaticity(D65_XY, 1.0)))
+}
+
 /// From XYZ to linear light of the primaries of sRGB, 1 of white light of the luminance 1; white is that of the metadata, or D65.
 fn light(frame: &FrameHeader) -> nalgebra::Matrix3<f64> {
     let white = frame.metadata.color.as_ref().and_then(|color| color.white);
@@ -324,7 +329,7 @@ pub(super) fn is_picture(frame: &FrameHeader, range: Option<Range>) -> bool {
     }
     match frame.metadata.quantity {
         _ if range.is_some_and(|range| range != Range::Full) => true,
-        QuantityKind::Xyz => !is_one && frame.metadata.color.as_ref().is_some_and(|color| color.white.is_some()),
+        QuantityKind::Xyz => !is_one && white_of(frame).is_some(),
         QuantityKind::Srgb
         | QuantityKind::ExpectedElectrons
         | QuantityKind::Electrons
