@@ -229,6 +229,14 @@ fn one_executable_is_most_programs() {
     let complaint = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(BAD_DATA), "{complaint}");
     assert!(complaint.contains("stack-frames: cannot run: no such file"), "{complaint}");
+    // Data are not beside it either, and nobody's own file is taken for one of them.
+    for (file, is_told) in [("clear_zenith.csv", true), ("sample_data/skies/none.csv", true), ("./sky.csv", false)] {
+        let done = alone("render-radiance", &[file]);
+        let complaint = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(BAD_DATA), "{complaint}");
+        let said = "the sample data are not installed beside the programs (`scripts/install` does that): let CYANOMETER_DATA name";
+        assert_eq!(complaint.contains(said), is_told, "{complaint}");
+    }
     let list = String::from_utf8(alone(FRONT, &[]).stdout).unwrap();
     assert_eq!(list.matches("not beside this program").count(), APART.len(), "{list}");
 }

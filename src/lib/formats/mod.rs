@@ -30,6 +30,7 @@ pub mod many;
 mod misread;
 mod other_keys;
 pub mod output;
+pub mod own_program;
 pub mod picture;
 pub mod pipe;
 pub mod places;

@@ -3,7 +3,7 @@
 
 use super::cells::MAX_CELLS;
 use super::csv::SpectralTable;
-use super::data::{near_spectrum, spectrum_file};
+use super::data::{near_spectrum, spectrum_file, without_data};
 use super::files::{named, open_named, read_table, spool};
 use super::format::HEAD_BYTES;
 use super::input::{FrameReader, InputOptions};
@@ -136,15 +136,15 @@ pub fn open(options: &InputOptions) -> Result<Radiances> {
     Ok(Radiances::Table(Box::new(SpectralTable::parse(&name, &bytes)?)))
 }
 
-/// A complaint of a file that is not there, with the spectrum of a data directory that may be meant.
-fn with_near_name(error: Error, path: Option<&Path>) -> Error {
-    match (error, path.and_then(near_spectrum)) {
-        (Error::Disk { file, source, .. }, Some(near)) if source.kind() == io::ErrorKind::NotFound => {
-            let problem = format!(
-                "there is no such file; did you mean `{near}`? `cyanometer list spectra` tells those known by name"
-            );
-            Error::format(&file, problem)
-        }
+/// A complaint of a file that is not there, with the spectrum of a data directory that may be meant, or that there are no data.
+pub fn with_near_name(error: Error, path: Option<&Path>) -> Error {
+    let advice = || match path.and_then(near_spectrum) {
+        Some(near) => Some(format!("did you mean `{near}`? `cyanometer list spectra` tells those known by name")),
+        None => path.and_then(without_data),
+    };
+    let is_missing = matches!(&error, Error::Disk { source, .. } if source.kind() == io::ErrorKind::NotFound);
+    match (error, is_missing.then(advice).flatten()) {
+        (Error::Disk { file, .. }, Some(advice)) => Error::format(&file, format!("there is no such file; {advice}")),
         (error, _) => error,
     }
 }
