@@ -28,6 +28,7 @@ mod ljpeg;
 pub mod makers;
 pub mod many;
 mod misread;
+mod misspelt;
 mod other_keys;
 pub mod output;
 pub mod own_program;
