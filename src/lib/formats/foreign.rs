@@ -74,7 +74,23 @@ pub fn yaml_problem(error: &serde_yaml::Error) -> String {
     match misfit(&text) {
         Some(problem) => problem,
         None if text.contains("more than one document") => "it holds more than one document; leave one".into(),
-        None => not_yaml(&text).unwrap_or_else(|| format!("it is not as expected: {text}")),
+        None => not_yaml(&text).unwrap_or_else(|| refused_value(&text)),
+    }
+}
+
+/// A complaint of ours about a value, which the parser puts the path of its keys before, and the place behind.
+fn refused_value(text: &str) -> String {
+    let (what, place) = match text.rsplit_once(" at line ") {
+        Some((what, place)) => (what, format!(" (line {})", place.replace(" column ", ", column "))),
+        None => (text, String::new()),
+    };
+    let is_path = |path: &str| {
+        path.starts_with(|c: char| c.is_ascii_lowercase())
+            && path.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"_.[]".contains(&byte))
+    };
+    match what.split_once(": ").filter(|(path, _)| is_path(path)) {
+        Some((path, problem)) => format!("in `{path}`, {problem}{place}"),
+        None => format!("it is not as expected: {what}{place}"),
     }
 }
 
@@ -173,7 +189,10 @@ fn misfit(text: &str) -> Option<String> {
             let names = expected.trim_start_matches("one of ");
             format!("{key} is {found}; known are {names}{place}")
         }
-        "invalid length " => format!("{key} has {found} entries, not {}{place}", wanted(expected)),
+        "invalid length " => {
+            let entries = if found == "1" { "entry" } else { "entries" };
+            format!("{key} has {found} {entries}, not {}{place}", wanted(expected))
+        }
         "data did not match any variant" => format!("{key} has none of the forms that are read{place}"),
         _ => {
             let hint = remedy(found, expected).map_or(String::new(), |hint| format!("; {hint}"));
@@ -430,6 +449,29 @@ mod tests {
         ] {
             assert_eq!(refused(text), format!("s.yaml: {wanted}"));
         }
+    }
+
+    #[test]
+    fn values_that_we_refuse_are_told_with_their_keys() {
+        let complaint = |text: &str| yaml_problem(&serde_yaml::from_str::<ReadOut>(text).unwrap_err());
+        let refused = complaint("cfa: rgbg\n");
+        assert!(
+            refused.starts_with("in `cfa`, `rgbg` is no filter array; one is ")
+                && refused.ends_with(" (line 1, column 6)"),
+            "{refused}"
+        );
+        let lists = complaint("xy: [0.3]\n");
+        assert_eq!(lists, "`xy` has 1 entry, not a list of 2 (line 1, column 5)");
+        assert_eq!(refused_value("no such thing: ever"), "it is not as expected: no such thing: ever");
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[expect(dead_code, reason = "nothing is read")]
+    struct ReadOut {
+        #[serde(default)]
+        cfa: Option<crate::cfa::FilterArray>,
+        #[serde(default)]
+        xy: Option<[f64; 2]>,
     }
 
     #[test]
