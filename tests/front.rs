@@ -166,6 +166,15 @@ fn manual_pages_have_their_sections() {
         let page = text(&shop, &format!("{program} --manual"));
         let places: Vec<Option<usize>> = SECTIONS.iter().map(|name| page.find(&format!(".SH {name}\n"))).collect();
         assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{program}: {places:?}");
+        // What has no name comes before options, as in help.
+        if let Some(arguments) = page.find(".SH ARGUMENTS\n") {
+            let options = page.find(".SH OPTIONS\n").unwrap_or_else(|| page.find(".SH EXAMPLES\n").unwrap());
+            assert!(places[2] < Some(arguments) && arguments < options, "{program}: {page}");
+        }
+        let inputs = page.matches("\n[\\fIINPUT\\fR]").count();
+        let first =
+            page.split(".SH ARGUMENTS\n").nth(1).and_then(|behind| behind.split(".SH ").next()).unwrap_or_default();
+        assert_eq!(first.matches("\n[\\fIINPUT\\fR]").count(), inputs, "{program}: {page}");
         let synopsis = page.split(".SH SYNOPSIS\n").nth(1).unwrap().lines().next().unwrap();
         assert!(
             synopsis.len() < 200 && synopsis.starts_with(&format!("\\fB{}\\fR ", program.replace('-', "\\-"))),
