@@ -212,9 +212,15 @@ fn remedy(found: &str, expected: &str) -> Option<String> {
             let end = text.rfind(|c: char| c.is_ascii_digit()).map_or(0, |last| last + 1);
             let (number, unit) = text.split_at(end);
             let point = text.replacen(',', ".", 1);
+            let is_whole = !expected.starts_with('f');
             match share {
                 Some(percent) => Some(format!("write it as a fraction of 1, {}", in_decimals(percent / 100.0, 9))),
                 None if is_number(text) => Some("leave out its quotes".into()),
+                None if has_thousands(text) => Some(match text.replace(',', "") {
+                    // A comma of decimals would be one, before no point.
+                    whole if is_number(&point) && !is_whole => format!("write {whole}, or {point} where that is meant"),
+                    whole => format!("write {whole}"),
+                }),
                 None if is_number(&point) => Some(format!("write {point}")),
                 None if is_number(number) => {
                     Some(format!("write {number}, in the unit of the key, without `{}`", unit.trim()))
@@ -234,6 +240,22 @@ fn remedy(found: &str, expected: &str) -> Option<String> {
         }
         _ => None,
     }
+}
+
+/// Whether all commas of a number can be marks of thousands: up to three digits before the first, not `0`, and three behind each.
+fn has_thousands(text: &str) -> bool {
+    let unsigned = text.strip_prefix(['+', '-']).unwrap_or(text);
+    let (whole, decimals) = unsigned.split_once('.').unwrap_or((unsigned, ""));
+    let are_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    let mut groups = whole.split(',');
+    let first = groups.next().unwrap_or_default();
+    let mut behind = groups.peekable();
+    behind.peek().is_some()
+        && (1..=3).contains(&first.len())
+        && !first.starts_with('0')
+        && are_digits(first)
+        && are_digits(decimals)
+        && behind.all(|group| group.len() == 3 && are_digits(group))
 }
 
 /// What `serde` found, in our words.
@@ -479,6 +501,13 @@ mod tests {
         let told = |text: &str, expected| remedy(&format!("string \"{text}\""), expected);
         for (text, expected, wanted) in [
             ("15,7", "f64", Some("write 15.7")),
+            ("32,000", "f64", Some("write 32000, or 32.000 where that is meant")),
+            ("-1,234.5", "f64", Some("write -1234.5")),
+            ("1,234,567", "f64", Some("write 1234567")),
+            ("1,920", "u32", Some("write 1920")),
+            ("0,125", "f64", Some("write 0.125")),
+            ("1234,567", "f64", Some("write 1234.567")),
+            ("12,3456", "f64", Some("write 12.3456")),
             ("15.7 e-", "f64", Some("write 15.7, in the unit of the key, without `e-`")),
             ("33ms", "f64", Some("write 33, in the unit of the key, without `ms`")),
             ("0.8%", "f64", Some("write it as a fraction of 1, 0.008")),
