@@ -166,6 +166,15 @@ fn manual_pages_have_their_sections() {
         let page = text(&shop, &format!("{program} --manual"));
         let places: Vec<Option<usize>> = SECTIONS.iter().map(|name| page.find(&format!(".SH {name}\n"))).collect();
         assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{program}: {places:?}");
+        // What has no name comes before options, as in help.
+        if let Some(arguments) = page.find(".SH ARGUMENTS\n") {
+            let options = page.find(".SH OPTIONS\n").unwrap_or_else(|| page.find(".SH EXAMPLES\n").unwrap());
+            assert!(places[2] < Some(arguments) && arguments < options, "{program}: {page}");
+        }
+        let inputs = page.matches("\n[\\fIINPUT\\fR]").count();
+        let first =
+            page.split(".SH ARGUMENTS\n").nth(1).and_then(|behind| behind.split(".SH ").next()).unwrap_or_default();
+        assert_eq!(first.matches("\n[\\fIINPUT\\fR]").count(), inputs, "{program}: {page}");
         let synopsis = page.split(".SH SYNOPSIS\n").nth(1).unwrap().lines().next().unwrap();
         assert!(
             synopsis.len() < 200 && synopsis.starts_with(&format!("\\fB{}\\fR ", program.replace('-', "\\-"))),
@@ -229,6 +238,14 @@ fn one_executable_is_most_programs() {
     let complaint = String::from_utf8_lossy(&done.stderr).into_owned();
     assert_eq!(done.status.code(), Some(BAD_DATA), "{complaint}");
     assert!(complaint.contains("stack-frames: cannot run: no such file"), "{complaint}");
+    // Data are not beside it either, and nobody's own file is taken for one of them.
+    for (file, is_told) in [("clear_zenith.csv", true), ("sample_data/skies/none.csv", true), ("./sky.csv", false)] {
+        let done = alone("render-radiance", &[file]);
+        let complaint = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(BAD_DATA), "{complaint}");
+        let said = "the sample data are not installed beside the programs (`scripts/install` does that): let CYANOMETER_DATA name";
+        assert_eq!(complaint.contains(said), is_told, "{complaint}");
+    }
     let list = String::from_utf8(alone(FRONT, &[]).stdout).unwrap();
     assert_eq!(list.matches("not beside this program").count(), APART.len(), "{list}");
 }

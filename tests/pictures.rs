@@ -6,6 +6,7 @@ mod support;
 
 use cyanometer::color::rgb::{Encoding, NamedPrimaries, xyz_from_rgb};
 use cyanometer::color::xyz_of_chromaticity;
+use cyanometer::formats::exr::{ExrCompression, ExrSamples, ExrTags, ExrWriter, Layers};
 use cyanometer::frame::{Geometry, to_sample};
 use cyanometer::metadata::{FrameHeader, Metadata};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
@@ -282,4 +283,68 @@ fn a_clean_frame_says_so_and_takes_no_sources() {
         let output = shop.attempt(&format!("add-noise in.exr --clean {idle} -o x.exr"), &[]);
         assert_eq!(output.status.code(), Some(BAD_USAGE), "{idle}");
     }
+}
+
+/// Writes a spectral image in which all channels of a pixel are alike.
+fn write_spectral(shop: &Workshop, name: &str, unit: Option<&str>, channels: &[&str], rows: &[[f32; 4]]) {
+    let geometry = Geometry::new(4, rows.len(), channels);
+    let tags = ExrTags { emissive_units: unit.map(str::to_owned), ..ExrTags::default() };
+    let file = fs::File::create(shop.path(name)).unwrap();
+    let (kind, compression) = (ExrSamples::F32, ExrCompression::None);
+    let mut writer =
+        ExrWriter::create(file, name, &geometry, kind, compression, Layers::BesideTheImage, &tags).unwrap();
+    let samples: Vec<f32> = rows.iter().flat_map(|row| channels.iter().flat_map(|_| *row)).collect();
+    writer.write(&samples).unwrap();
+    writer.finish().unwrap();
+}
+
+const BANDS: [&str; 3] = ["S0.360,000000nm", "S0.550,000000nm", "S0.830,000000nm"];
+
+/// A clear sky in W m⁻² sr⁻¹ nm⁻¹, 0.1, is 1500 times as bright as a white cloud, 6.7·10⁻⁵, where W cm⁻² are assumed.
+#[test]
+fn spectral_images_that_are_too_bright_for_their_unit_are_told() {
+    let shop = Workshop::new();
+    let (sky, dark) = ([0.1; 4], [1e-6; 4]);
+    let write = |unit, rows: &[[f32; 4]]| write_spectral(&shop, "a.exr", unit, &BANDS, rows);
+    let bright = "1500 times as bright as a white cloud in the sun";
+    write(None, &[dark, dark, sky]);
+    for line in ["render-radiance a.exr -o out.exr", "predict-noise a.exr --all-samples --expose-to 0.5"] {
+        let said = shop.said(line, BAD_DATA);
+        let wanted = "a.exr: it does not say the unit of its radiance; in W cm-2 sr-1 nm-1 it would be";
+        assert!(said.contains(wanted) && said.contains(bright) && said.contains("give --radiance-unit"), "{said}");
+    }
+    // Of a chosen pixel the others do not matter.
+    assert!(!shop.said("render-radiance a.exr --sample 3 --size 2x2 -o out.exr", 0).contains(bright));
+    assert!(shop.said("render-radiance a.exr --sample 9 --size 2x2 -o out.exr", BAD_DATA).contains(bright));
+    let given = shop.said("render-radiance a.exr --radiance-unit W/m2/sr/nm -o out.exr", 0);
+    assert!(!given.contains("white cloud"), "{given}");
+
+    // A stated unit counts: it is asked about once, where most pixels are so bright, which those of a lamp are not.
+    let stated = "W.cm^-2.sr^-1.nm^-1";
+    for (rows, is_told) in [(&[sky, sky, dark][..], true), (&[dark, sky, dark], false), (&[dark], false)] {
+        write(Some(stated), rows);
+        for line in ["render-radiance a.exr -o out.exr", "predict-noise a.exr --all-samples --expose-to 0.5"] {
+            let said = shop.said(line, 0);
+            assert_eq!(said.matches("is that its unit?").count(), usize::from(is_told), "{line}: {said}");
+        }
+    }
+}
+
+#[test]
+fn channels_in_um_are_those_in_nm_and_others_are_told() {
+    let shop = Workshop::new();
+    let rows = [[1e-6, 2e-6, 3e-6, 4e-6]; 2];
+    let mut seen = Vec::new();
+    for channels in [BANDS, ["S0.0,360um", "S0.0,55um", "S0.0,830000um"]] {
+        write_spectral(&shop, "a.exr", Some("W.cm^-2.sr^-1.nm^-1"), &channels, &rows);
+        assert!(shop.attempt("render-radiance a.exr -o out.exr", &[]).status.success());
+        seen.push(shop.frame("out.exr").samples);
+    }
+    assert_eq!(seen[0], seen[1]);
+    write_spectral(&shop, "a.exr", None, &["S0.545,1THz", "S0.600,0THz"], &rows);
+    let said = shop.said("render-radiance a.exr -o out.exr", BAD_DATA);
+    assert!(
+        said.contains("its channel `S0.545,1THz` does not count wavelengths in nm or um, which alone are read"),
+        "{said}"
+    );
 }

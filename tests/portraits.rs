@@ -230,6 +230,33 @@ fn saturated_samples_do_not_make_the_scale() {
     assert!(laws(&plain) > laws(&saturated), "{} {}", laws(&plain), laws(&saturated));
 }
 
+/// A law of which hot photosites make the spread shows no other sample, and is not drawn; where they make next to nothing of it, it is.
+#[test]
+fn no_law_is_drawn_of_what_hot_photosites_make() {
+    let shop = Workshop::new();
+    let figure = |excess: &str, electrons: &str| {
+        let hot = format!("--set hot_pixel_share=0.001 --set hot_pixel_dark_current_e_per_s={excess}");
+        let render = format!("render-radiance --electrons {electrons} --size 64x48 {hot} -o expected.exr");
+        for line in [
+            &render,
+            "add-noise expected.exr --seed 3 -o noisy.exr",
+            "digitize noisy.exr -o codes.exr",
+            "measure codes.exr --plot plot.svg",
+        ] {
+            assert!(shop.attempt(line, &[]).status.success(), "{line}");
+        }
+        words(&String::from_utf8(shop.bytes("plot.svg")).unwrap())
+    };
+    let (told, law) = ("no law drawn: few photosites far off make its spread", "predicted: normal, rounded");
+    // Excesses of 33 and 3300 e- in 33 ms beside 30 e- of noise or more: 2·10⁻³·33² e-² and 2·10⁻³·3300² e-².
+    for (excess, electrons, is_told) in
+        [("1000", "100,100,100", false), ("100000", "100,100,100", true), ("10000", "30000,30000,30000", false)]
+    {
+        let all = figure(excess, electrons);
+        assert_eq!((all.contains(told), all.contains(law)), (is_told, !is_told), "{excess} {electrons}: {all}");
+    }
+}
+
 /// Color temperatures are shown by their inverses, in which equal steps are equally visible: 4000 K are 250 MK⁻¹.
 #[test]
 fn color_temperatures_are_shown_by_their_inverses() {

@@ -171,3 +171,18 @@ fn a_dng_of_scaled_codes_has_scaled_levels() {
     assert_eq!(bench.frame("scaled.dng").samples, plain.samples);
     assert_eq!(bench.sidecar("scaled.dng").samples, bench.sidecar("plain.dng").samples);
 }
+
+/// A scale that is no power of two is refused also where the file has metadata of its own, which count.
+#[test]
+fn a_scale_that_cannot_be_is_refused_wherever_it_stands() {
+    let shop = Workshop::new();
+    shop.run("render-radiance --electrons 3000,5000,7000 --size 8x6 -o rates.exr", &[]);
+    let own = fs::read_to_string(shop.path("rates.exr.yaml")).unwrap();
+    for (scale, is_refused) in [("3", true), ("0", true), ("-2", true), ("0.25", false)] {
+        fs::write(shop.path("given.yaml"), format!("{own}sample_scale: {scale}\n")).unwrap();
+        let output = shop.attempt("measure rates.exr --metadata given.yaml", &[]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let wanted = format!("given.yaml: its `sample_scale`, {scale}, is no power of two");
+        assert_eq!((output.status.success(), said.contains(&wanted)), (!is_refused, is_refused), "{said}");
+    }
+}

@@ -6,6 +6,7 @@ pub use between::{Along, Between};
 
 use crate::error::{Error, Result};
 use crate::numerics::quadrature::{self, Rule};
+use crate::units::WavelengthUnit;
 use ndarray::{Array1, Array2, ArrayView1, Axis};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -164,15 +165,29 @@ fn neighbors(table: &[f64], wavelength_nm: f64) -> Option<[(usize, f64); 2]> {
     Some([(above - 1, 1.0 - share), (above, share)])
 }
 
-/// The wavelength in nm that a channel's name states, as in `S0.550,000000nm` \[Fichet2021], or the center of its bin, as in
+/// The wavelength in nm that a channel's name states, as in `S0.550,000000nm` or `S0.0,550um` \[Fichet2021], or the center of its bin, as in
 /// `400.00-410.00nm` (Mitsuba 0.6); none for channels of another kind.
 pub fn channel_wavelength_nm(channel: &str) -> Option<f64> {
     let is_wavelength = |nm: &f64| *nm > 0.0 && nm.is_finite();
     if let Some([begin, end]) = channel_bin_nm(channel) {
         return Some(f64::midpoint(begin, end));
     }
-    let number = channel.strip_prefix("S0.")?.strip_suffix("nm")?;
-    number.replace(',', ".").parse().ok().filter(is_wavelength)
+    let stated = channel.strip_prefix("S0.")?;
+    let number = |text: &str| text.replace(',', ".").parse::<f64>().ok();
+    let nm = match stated.strip_suffix("nm") {
+        Some(nm) => number(nm)?,
+        None => WavelengthUnit::Micrometer.nm(number(stated.strip_suffix("um")?)?),
+    };
+    Some(nm).filter(is_wavelength)
+}
+
+/// Whether a channel is named as \[Fichet2021] has it, in a unit of wavelength or frequency that is not read: `S0.545,1THz`.
+pub fn is_channel_of_another_unit(channel: &str) -> bool {
+    let Some(stated) = channel.strip_prefix("S0.") else { return false };
+    let unit = stated.trim_start_matches(|symbol: char| symbol.is_ascii_digit() || symbol == ',' || symbol == '.');
+    unit.len() < stated.len()
+        && (unit.ends_with("Hz") || unit.ends_with('m'))
+        && channel_wavelength_nm(channel).is_none()
 }
 
 /// Where the bin in nm that a channel's name states begins and ends, as in `400.00-410.00nm`, perhaps behind a layer's name.
@@ -295,6 +310,7 @@ mod tests {
     fn channel_names_state_wavelengths() {
         assert_eq!(channel_wavelength_nm("S0.550,000000nm"), Some(550.0));
         assert_eq!(channel_wavelength_nm("S0.550.5nm"), Some(550.5));
+        assert_eq!(channel_wavelength_nm("S0.0,550000um"), Some(550.0));
         assert_eq!(channel_wavelength_nm("400.00-410.00nm"), Some(405.0));
         assert_eq!(channel_wavelength_nm("direct.400.00-410.00nm"), Some(405.0));
         for other in
@@ -302,6 +318,10 @@ mod tests {
         {
             assert_eq!(channel_wavelength_nm(other), None);
         }
+        assert!(["S0.545,1THz", "S0.5,5mm", "S0.0,0000005m"].into_iter().all(is_channel_of_another_unit));
+        assert!(
+            !["S0.550,0nm", "S0.0,55um", "S0.nm", "S1.545,1THz", "S0.1,0"].into_iter().any(is_channel_of_another_unit)
+        );
     }
 
     #[test]

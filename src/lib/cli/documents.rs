@@ -42,16 +42,32 @@ fn manual(command: &Command) -> io::Result<Vec<u8>> {
     let source = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
     // Examples are a section of their own, as is what calls it.
     let plain = without_summary(command.clone().after_long_help(None::<&str>));
-    let man = Man::new(plain).source(source).manual(project);
+    let [arguments, options] = parted(plain);
+    let man = Man::new(options).source(source).manual(project);
     man.render_title(&mut page)?;
     man.render_name_section(&mut page)?;
     page.extend(synopsis(command).bytes());
     man.render_description_section(&mut page)?;
+    let mut first = Vec::new();
+    Man::new(arguments).render_options_section(&mut first)?;
+    page.extend(String::from_utf8_lossy(&first).replace(".SH OPTIONS", ".SH ARGUMENTS").bytes());
     man.render_options_section(&mut page)?;
     page.extend(examples::roff(name).bytes());
     page.extend(format!("{}{}{}", exit_status(name), ENVIRONMENT, files(command)).bytes());
     page.extend(see_also(name).bytes());
     Ok(page)
+}
+
+/// A program with its arguments alone, which come first as in help, and with its options alone.
+fn parted(mut command: Command) -> [Command; 2] {
+    // The option that gives help is among them from now on.
+    command.build();
+    [false, true].map(|is_of_options| {
+        command.clone().mut_args(|argument| match argument.is_positional() == is_of_options {
+            true => argument.hide(true),
+            false => argument,
+        })
+    })
 }
 
 /// The same with a description that does not begin with what stands behind the name.

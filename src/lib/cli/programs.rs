@@ -4,6 +4,7 @@ use super::documents::SUMMARY;
 pub use super::roster::{APART, OWN, PROGRAMS};
 use super::{complain, show};
 use crate::error::{Error, Result};
+use crate::formats::own_program::own_program;
 use crate::names::nearest;
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
@@ -25,7 +26,7 @@ such a file to begin with. `PROGRAM --help` tells what each takes, as `cyanomete
 /// What starts a program: the file beside the one that runs, which is called `cyanometer-PROGRAM` where a system keeps its plain
 /// name for any package's (Debian's alternatives); or, where there is none, the front door, which can be most of them.
 pub(super) fn command(program: &str) -> Result<Command> {
-    let this = std::env::current_exe().map_err(|e| Error::disk(program, "find", e))?;
+    let this = own_program().map_err(|e| Error::disk(program, "find", e))?;
     let own = this.with_file_name(format!("{}-{program}", env!("CARGO_PKG_NAME")));
     let plain = this.with_file_name(program);
     if own.is_file() {
@@ -60,7 +61,7 @@ pub fn hand_over(front: &'static str) -> Option<ExitCode> {
         let is_other =
             program.to_string_lossy().starts_with('-') || OWN.into_iter().any(|known| OsStr::new(known) == program);
         if program.is_empty() || is_other {
-            let error = std::env::current_exe().map(|this| Command::new(this).arg0(front).args(help).exec());
+            let error = own_program().map(|this| Command::new(this).arg0(front).args(help).exec());
             complain(front, &Error::disk(front, "run", error.unwrap_or_else(|error| error)).to_string());
             return Some(ExitCode::FAILURE);
         }

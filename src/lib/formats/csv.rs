@@ -9,7 +9,7 @@ use super::delimited;
 use super::factors::doubt_of_factor;
 use super::foreign::{csv_complaint, line_of};
 use super::misread::{self, is_units};
-use super::radiance_unit::{self, FileSays};
+use super::radiance_unit::{self, Brightness, FileSays, times_white};
 use super::register;
 use super::remarks::{Comments, MAX_COMMENTS};
 use super::spectral_heading::{self, Wavelengths, check_first_column, is_behind_index, refuse_index, without_first};
@@ -19,7 +19,6 @@ use super::wavelengths::{check_nm, check_order, check_stated};
 use crate::error::{Error, Result};
 use crate::names::place_of;
 use crate::spectrum::{Along, Between, Curve};
-use crate::text::about;
 use crate::units::{OtherUnit, RadianceUnit, Stated, WavelengthUnit, unit_of_heading};
 use csv::StringRecord;
 use ndarray::{Array2, Axis};
@@ -53,9 +52,6 @@ pub fn text_column(name: &str, bytes: &[u8], column: &str) -> Result<Vec<String>
     })?;
     reader.records().map(|record| record.map(|row| row[place].to_owned()).map_err(not_csv)).collect()
 }
-
-/// So many times as bright as a white cloud in the sun a sky may be in places, near the sun.
-const BRIGHTEST: f64 = 100.0;
 
 /// Curves over common wavelengths.
 #[derive(Debug, Clone, PartialEq)]
@@ -314,16 +310,13 @@ impl SpectralTable {
         }
         let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
         let (unit, assumed) = radiance_unit::settle(says, given)?;
-        let times = self.times_white(index, unit);
+        let samples = self.values.row(index).into_iter().zip(&self.wavelength_nm);
+        let brightest = samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).fold(0.0, f64::max);
+        let times = times_white(brightest);
         self.points.check(&self.name, index, times)?;
-        let Some(times) = Some(times).filter(|times| *times > BRIGHTEST) else { return Ok((unit, assumed)) };
-        let times = about(times, 2);
-        let bright = format!("in {unit} it would be {times} times as bright as a white cloud in the sun");
-        if assumed.is_some() && given.is_none() {
-            let problem = format!("it does not say the unit of its radiance; {bright}");
-            return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
-        }
-        Ok((unit, Some(assumed.unwrap_or_else(|| format!("{}: {bright}: is that its unit?", self.name)))))
+        let is_assumed = heading.is_none() && self.remarks.is_empty() && given.is_none();
+        let bright = Brightness::of([times]).judge(&self.name, unit, is_assumed)?;
+        Ok((unit, assumed.or(bright)))
     }
 
     /// The columns of which nothing says that they hold anything but radiances.
@@ -333,15 +326,6 @@ impl SpectralTable {
         let all = self.columns.iter().zip(&self.headings).enumerate();
         let likely = all.filter(|(index, (_, says))| !is_other(says) && !self.spoiled.contains_key(index));
         likely.map(|(_, (column, _))| column.as_str()).collect()
-    }
-
-    /// How many times as bright as a white cloud in the sun the brightest radiance is in a unit.
-    fn times_white(&self, index: usize, unit: RadianceUnit) -> f64 {
-        /// Spectral radiance of what scatters all the light of the sun evenly, as the whitest cloud does, at its brightest, in
-        /// W cm⁻² sr⁻¹ nm⁻¹: the extraterrestrial irradiance of \[ASTM E490], 2.1 W m⁻² nm⁻¹, over π.
-        const WHITE: f64 = 6.7e-5;
-        let samples = self.values.row(index).into_iter().zip(&self.wavelength_nm);
-        samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).fold(0.0, f64::max) / WHITE
     }
 
     /// The first column as the relative power of a light, per interval of wavelength.

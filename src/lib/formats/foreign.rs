@@ -74,7 +74,23 @@ pub fn yaml_problem(error: &serde_yaml::Error) -> String {
     match misfit(&text) {
         Some(problem) => problem,
         None if text.contains("more than one document") => "it holds more than one document; leave one".into(),
-        None => not_yaml(&text).unwrap_or_else(|| format!("it is not as expected: {text}")),
+        None => not_yaml(&text).unwrap_or_else(|| refused_value(&text)),
+    }
+}
+
+/// A complaint of ours about a value, which the parser puts the path of its keys before, and the place behind.
+fn refused_value(text: &str) -> String {
+    let (what, place) = match text.rsplit_once(" at line ") {
+        Some((what, place)) => (what, format!(" (line {})", place.replace(" column ", ", column "))),
+        None => (text, String::new()),
+    };
+    let is_path = |path: &str| {
+        path.starts_with(|c: char| c.is_ascii_lowercase())
+            && path.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"_.[]".contains(&byte))
+    };
+    match what.split_once(": ").filter(|(path, _)| is_path(path)) {
+        Some((path, problem)) => format!("in `{path}`, {problem}{place}"),
+        None => format!("it is not as expected: {what}{place}"),
     }
 }
 
@@ -173,7 +189,10 @@ fn misfit(text: &str) -> Option<String> {
             let names = expected.trim_start_matches("one of ");
             format!("{key} is {found}; known are {names}{place}")
         }
-        "invalid length " => format!("{key} has {found} entries, not {}{place}", wanted(expected)),
+        "invalid length " => {
+            let entries = if found == "1" { "entry" } else { "entries" };
+            format!("{key} has {found} {entries}, not {}{place}", wanted(expected))
+        }
         "data did not match any variant" => format!("{key} has none of the forms that are read{place}"),
         _ => {
             let hint = remedy(found, expected).map_or(String::new(), |hint| format!("; {hint}"));
@@ -193,9 +212,15 @@ fn remedy(found: &str, expected: &str) -> Option<String> {
             let end = text.rfind(|c: char| c.is_ascii_digit()).map_or(0, |last| last + 1);
             let (number, unit) = text.split_at(end);
             let point = text.replacen(',', ".", 1);
+            let is_whole = !expected.starts_with('f');
             match share {
                 Some(percent) => Some(format!("write it as a fraction of 1, {}", in_decimals(percent / 100.0, 9))),
                 None if is_number(text) => Some("leave out its quotes".into()),
+                None if has_thousands(text) => Some(match text.replace(',', "") {
+                    // A comma of decimals would be one, before no point.
+                    whole if is_number(&point) && !is_whole => format!("write {whole}, or {point} where that is meant"),
+                    whole => format!("write {whole}"),
+                }),
                 None if is_number(&point) => Some(format!("write {point}")),
                 None if is_number(number) => {
                     Some(format!("write {number}, in the unit of the key, without `{}`", unit.trim()))
@@ -215,6 +240,22 @@ fn remedy(found: &str, expected: &str) -> Option<String> {
         }
         _ => None,
     }
+}
+
+/// Whether all commas of a number can be marks of thousands: up to three digits before the first, not `0`, and three behind each.
+fn has_thousands(text: &str) -> bool {
+    let unsigned = text.strip_prefix(['+', '-']).unwrap_or(text);
+    let (whole, decimals) = unsigned.split_once('.').unwrap_or((unsigned, ""));
+    let are_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    let mut groups = whole.split(',');
+    let first = groups.next().unwrap_or_default();
+    let mut behind = groups.peekable();
+    behind.peek().is_some()
+        && (1..=3).contains(&first.len())
+        && !first.starts_with('0')
+        && are_digits(first)
+        && are_digits(decimals)
+        && behind.all(|group| group.len() == 3 && are_digits(group))
 }
 
 /// What `serde` found, in our words.
@@ -433,10 +474,40 @@ mod tests {
     }
 
     #[test]
+    fn values_that_we_refuse_are_told_with_their_keys() {
+        let complaint = |text: &str| yaml_problem(&serde_yaml::from_str::<ReadOut>(text).unwrap_err());
+        let refused = complaint("cfa: rgbg\n");
+        assert!(
+            refused.starts_with("in `cfa`, `rgbg` is no filter array; one is ")
+                && refused.ends_with(" (line 1, column 6)"),
+            "{refused}"
+        );
+        let lists = complaint("xy: [0.3]\n");
+        assert_eq!(lists, "`xy` has 1 entry, not a list of 2 (line 1, column 5)");
+        assert_eq!(refused_value("no such thing: ever"), "it is not as expected: no such thing: ever");
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[expect(dead_code, reason = "nothing is read")]
+    struct ReadOut {
+        #[serde(default)]
+        cfa: Option<crate::cfa::FilterArray>,
+        #[serde(default)]
+        xy: Option<[f64; 2]>,
+    }
+
+    #[test]
     fn values_of_yaml_are_told_as_they_should_be() {
         let told = |text: &str, expected| remedy(&format!("string \"{text}\""), expected);
         for (text, expected, wanted) in [
             ("15,7", "f64", Some("write 15.7")),
+            ("32,000", "f64", Some("write 32000, or 32.000 where that is meant")),
+            ("-1,234.5", "f64", Some("write -1234.5")),
+            ("1,234,567", "f64", Some("write 1234567")),
+            ("1,920", "u32", Some("write 1920")),
+            ("0,125", "f64", Some("write 0.125")),
+            ("1234,567", "f64", Some("write 1234.567")),
+            ("12,3456", "f64", Some("write 12.3456")),
             ("15.7 e-", "f64", Some("write 15.7, in the unit of the key, without `e-`")),
             ("33ms", "f64", Some("write 33, in the unit of the key, without `ms`")),
             ("0.8%", "f64", Some("write it as a fraction of 1, 0.008")),

@@ -1,7 +1,64 @@
 //! The unit of a file's radiances: what the file says, what the user says, and what is assumed where nobody says anything.
 
 use crate::error::{Error, Result};
+use crate::text::about;
 use crate::units::{OtherUnit, RadianceUnit, Stated};
+
+/// Spectral radiance of what scatters all the light of the sun evenly, as the whitest cloud does, at its brightest, in
+/// W cm⁻² sr⁻¹ nm⁻¹: the extraterrestrial irradiance of \[ASTM E490], 2.1 W m⁻² nm⁻¹, over π.
+const WHITE: f64 = 6.7e-5;
+/// So many times as bright a sky may be in places, near the sun.
+const MOST: f64 = 100.0;
+
+/// How many times as bright as a white cloud in the sun a spectral radiance in W cm⁻² sr⁻¹ nm⁻¹ is.
+pub fn times_white(radiance: f64) -> f64 {
+    radiance / WHITE
+}
+
+/// How many of some spectra are brighter than any sky, which is what a wrong unit makes of them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Brightness {
+    spectra: usize,
+    bright: usize,
+    /// The brightest of all, in white clouds.
+    most: f64,
+}
+
+impl Brightness {
+    /// That of spectra whose largest values are so many times as bright as a white cloud in the sun.
+    pub fn of(times_white: impl IntoIterator<Item = f64>) -> Self {
+        times_white.into_iter().fold(Self::default(), |all, times| {
+            all.plus(Self { spectra: 1, bright: usize::from(times > MOST), most: times })
+        })
+    }
+
+    /// That of all spectra of two sets.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            spectra: self.spectra + other.spectra,
+            bright: self.bright + other.bright,
+            most: self.most.max(other.most),
+        }
+    }
+
+    /// Refuses bright spectra of file `name` in a unit that `is_assumed`; a warning where it is stated and more than half of them are
+    /// so bright, which lamps and the sun in an image are not.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] that wants the unit.
+    pub fn judge(self, name: &str, unit: RadianceUnit, is_assumed: bool) -> Result<Option<String>> {
+        let times = about(self.most, 2);
+        let bright = format!("in {unit} it would be {times} times as bright as a white cloud in the sun");
+        if is_assumed && self.bright > 0 {
+            let problem = format!("it does not say the unit of its radiance; {bright}");
+            return Err(Error::format(name, problem).give(&["radiance_unit"]));
+        }
+        let is_warned = self.bright > 0 && 2 * self.bright > self.spectra;
+        Ok(is_warned.then(|| format!("{name}: {bright}: is that its unit?")))
+    }
+}
 
 /// What a file says about the unit of its radiances.
 #[derive(Debug, Clone, Copy)]

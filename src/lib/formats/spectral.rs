@@ -3,16 +3,17 @@
 
 use super::cells::MAX_CELLS;
 use super::csv::SpectralTable;
-use super::data::{near_spectrum, spectrum_file};
+use super::data::{near_spectrum, spectrum_file, without_data};
 use super::files::{named, open_named, read_table, spool};
 use super::format::HEAD_BYTES;
 use super::input::{FrameReader, InputOptions};
-use super::radiance_unit::{self, FileSays};
+use super::radiance_unit::{self, Brightness, FileSays, times_white};
 use super::table;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::spectrum::{
     Along, Between, SpectralLibrary, channel_bin_nm, channel_wavelength_nm, chart_columns, check_wavelengths,
+    is_channel_of_another_unit,
 };
 use crate::stream::{RowSource, fold};
 use crate::units::{Any, OtherUnit, RadianceUnit, Stated, unit_of_heading};
@@ -31,6 +32,8 @@ pub struct SpectralChannels {
     pub unit: RadianceUnit,
     /// A warning, where the unit is assumed.
     pub warning: Option<String>,
+    /// Whether neither file nor user says the unit.
+    pub is_assumed: bool,
 }
 
 impl SpectralChannels {
@@ -52,10 +55,17 @@ impl SpectralChannels {
                 1 => "; of a gray picture store the plane three times, as R, G and B, for `render-radiance`",
                 _ => " (of a picture `render-radiance` takes R, G and B)",
             };
-            return Err(frame.refuse(format!(
-                "it holds no spectral radiance: no channel is named like S0.550,000000nm; give a spectrum as CSV or a \
-                 spectral EXR{hint}"
-            )));
+            let other = frame.geometry.channels.iter().find(|name| is_channel_of_another_unit(name));
+            return Err(frame.refuse(match other {
+                Some(other) => format!(
+                    "its channel `{other}` does not count wavelengths in nm or um, which alone are read, as in S0.550,000000nm; name \
+                     its channels so"
+                ),
+                None => format!(
+                    "it holds no spectral radiance: no channel is named like S0.550,000000nm; give a spectrum as CSV or a \
+                     spectral EXR{hint}"
+                ),
+            }));
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (wavelength_nm, channels): (Vec<f64>, Vec<usize>) = found.into_iter().unzip();
@@ -71,10 +81,11 @@ impl SpectralChannels {
             let problem = "its channels are bins of wavelength, and it does not say the unit of its radiance";
             return Err(frame.refuse(problem).give(&["radiance_unit"]));
         }
+        let is_assumed = heading.is_none() && unit.is_none();
         let place = "in the attribute `emissiveUnits`, as `W.m^-2.sr^-1.nm^-1`";
         let says = FileSays { name: &frame.name, heading: heading.as_ref(), remarks: &[], place };
         let (unit, warning) = radiance_unit::settle(says, unit)?;
-        Ok(Self { channels, wavelength_nm, unit, warning })
+        Ok(Self { channels, wavelength_nm, unit, warning, is_assumed })
     }
 
     /// The wavelengths at which its radiances are taken: those of its channels, and more where they are per interval of wavenumber,
@@ -125,15 +136,15 @@ pub fn open(options: &InputOptions) -> Result<Radiances> {
     Ok(Radiances::Table(Box::new(SpectralTable::parse(&name, &bytes)?)))
 }
 
-/// A complaint of a file that is not there, with the spectrum of a data directory that may be meant.
-fn with_near_name(error: Error, path: Option<&Path>) -> Error {
-    match (error, path.and_then(near_spectrum)) {
-        (Error::Disk { file, source, .. }, Some(near)) if source.kind() == io::ErrorKind::NotFound => {
-            let problem = format!(
-                "there is no such file; did you mean `{near}`? `cyanometer list spectra` tells those known by name"
-            );
-            Error::format(&file, problem)
-        }
+/// A complaint of a file that is not there, with the spectrum of a data directory that may be meant, or that there are no data.
+pub fn with_near_name(error: Error, path: Option<&Path>) -> Error {
+    let advice = || match path.and_then(near_spectrum) {
+        Some(near) => Some(format!("did you mean `{near}`? `cyanometer list spectra` tells those known by name")),
+        None => path.and_then(without_data),
+    };
+    let is_missing = matches!(&error, Error::Disk { source, .. } if source.kind() == io::ErrorKind::NotFound);
+    match (error, is_missing.then(advice).flatten()) {
+        (Error::Disk { file, .. }, Some(advice)) => Error::format(&file, format!("there is no such file; {advice}")),
         (error, _) => error,
     }
 }
@@ -153,6 +164,8 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
             let spectral = SpectralChannels::of(reader.header(), unit)?;
             let between = spectral.between();
             let factors = spectral.factors(&between);
+            let (unit, is_assumed) = (spectral.unit, spectral.is_assumed);
+            let mut brightness = Brightness::default();
             warnings.extend(spectral.warning);
             let geometry = reader.header().geometry.clone();
             // A header may declare any size: memory is taken as rows come.
@@ -164,11 +177,15 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
                         spectral.channels.iter().map(|&channel| window.row(y.cast_signed(), channel)).collect();
                     let pixel = |x: usize| between.values(|channel| f64::from(lines[channel][x]));
                     (0..geometry.width).for_each(|x| {
+                        let first = radiance.len();
                         radiance.extend(pixel(x).into_iter().zip(&factors).map(|(value, factor)| value * factor));
+                        let brightest = radiance[first..].iter().copied().fold(0.0, f64::max);
+                        brightness = brightness.plus(Brightness::of([times_white(brightest)]));
                     });
                 }
                 Ok(())
             })?;
+            warnings.extend(brightness.judge(&name, unit, is_assumed)?);
             let samples = radiance.len() / factors.len();
             let radiance = Array2::from_shape_vec((samples, factors.len()), radiance)
                 .map_err(|_| Error::format(&name, "its rows differ in length"))?;

@@ -297,27 +297,6 @@ fn check_keys(name: &str, raw: &Mapping, fields: Keys, parts: &[(&str, Keys)]) -
     Err(Error::format(name, format!("unknown key `{key}`{nearest}")))
 }
 
-/// Refuses unknown keys of metadata that a user wrote where they look like known ones. Other unknown keys are kept.
-///
-/// # Errors
-///
-/// [`Error::Format`] naming both.
-pub fn check_misspelt(name: &str, metadata: &Metadata) -> Result<()> {
-    misspelt(metadata).map_or(Ok(()), |problem| Err(Error::format(name, problem)))
-}
-
-/// The first unknown key of metadata that looks like a known one.
-pub fn misspelt(metadata: &Metadata) -> Option<String> {
-    let known = field_names::<Metadata>();
-    // A known key stands here for those within it that are not.
-    let unknown = metadata.unknown.keys().filter_map(Value::as_str).filter(|key| !known.contains(key));
-    unknown.into_iter().find_map(|key| {
-        let typed = key.to_lowercase();
-        let nearest = nearest(&typed, known.iter().copied(), |known| (known.len() / 4).min(2))?;
-        Some(format!("unknown key `{key}`; did you mean `{nearest}`?"))
-    })
-}
-
 /// [`parse_strict`] of a document with parts, each of which has keys of its own.
 fn parse_parts<T: DeserializeOwned + Serialize>(name: &str, bytes: &[u8], parts: &[(&str, Keys)]) -> Result<T> {
     let text = checked_text(name, bytes)?;

@@ -7,7 +7,7 @@ use crate::cfa::{Class, FilterArray};
 use crate::metadata::FrameHeader;
 use crate::numerics::normal::MeanVariance;
 use crate::propagation::taps::pooled;
-use crate::propagation::{FramePrediction, PixelMoments, gains};
+use crate::propagation::{FramePrediction, PixelMoments, Prediction, gains};
 use crate::stream::{Passing, RowSource};
 use crate::units::QuantityKind;
 use std::collections::VecDeque;
@@ -72,6 +72,8 @@ pub struct Foreseen {
     pub mean: f64,
     /// Standard deviations of the normal laws that samples are of, in equal shares: one, or one for each phase of the array.
     pub stds: Vec<f64>,
+    /// Whether few samples that stand out, as those of hot photosites, make so much of the spread that no normal law shows the others.
+    pub has_few_far: bool,
     /// Standard deviation of a point of each profile; none where neighbors hang together in ways that are not followed.
     pub profile_std: Option<[f64; 2]>,
     /// Correlations along x, and along y, at each lag; none as before.
@@ -159,7 +161,7 @@ impl Portrait {
         let size = [region.width, region.height];
         let foreseen = |index: usize| {
             let prediction = prediction.filter(|_| names.len() == 3 && frame.metadata.quantity != QuantityKind::Cct)?;
-            Some(Foreseen::of(prediction, index, share(index), steps, size, frame.metadata.is_transferred()))
+            Some(Foreseen::of(prediction, index, share(index), steps, size, frame))
         };
         let is_codes = frame.metadata.quantity == QuantityKind::Adu;
         let groups = names.iter().enumerate();
@@ -271,8 +273,9 @@ impl Foreseen {
         share: f64,
         steps: [usize; 2],
         size: [usize; 2],
-        is_moved: bool,
+        frame: &FrameHeader,
     ) -> Self {
+        let (is_moved, is_codes) = (frame.metadata.is_transferred(), frame.metadata.quantity == QuantityKind::Adu);
         // A point of the profile along x is of some columns, as high as the region; along y of some rows, as wide.
         let patches = [[steps[0].min(size[0]), size[1]], [size[0], steps[1].min(size[1])]];
         let foreseen = match prediction {
@@ -290,18 +293,31 @@ impl Foreseen {
                 Self {
                     mean: class.moments.mean,
                     stds: vec![variance.max(0.0).sqrt()],
+                    has_few_far: stands_out(class, is_codes),
                     profile_std: Some(patches.map(mean_std)),
                     correlations: Some([correlation(row), correlation(column)]),
                 }
             }
             FramePrediction::Groups(groups) => {
                 let MeanVariance { mean, variance } = pooled(groups)[index].moments;
-                Self { mean, stds: vec![variance.max(0.0).sqrt()], profile_std: None, correlations: None }
+                Self {
+                    mean,
+                    stds: vec![variance.max(0.0).sqrt()],
+                    has_few_far: false,
+                    profile_std: None,
+                    correlations: None,
+                }
             }
             FramePrediction::Pixels(mixture) => Self::of_pixels(mixture, index, patches),
             FramePrediction::Tapped(pixels) => {
                 let (mean, variance) = (pixels.mean[index], pixels.covariance[(index, index)]);
-                Self { mean, stds: vec![variance.max(0.0).sqrt()], profile_std: None, correlations: None }
+                Self {
+                    mean,
+                    stds: vec![variance.max(0.0).sqrt()],
+                    has_few_far: false,
+                    profile_std: None,
+                    correlations: None,
+                }
             }
         };
         // Of a level that drifts from row to row no profile is told.
@@ -326,6 +342,7 @@ impl Foreseen {
         Self {
             mean: mixture.mean[index],
             stds: [0, 1, 2, 3].map(|phase| (of(gains::pixel(weights, phase)) + beyond).max(0.0).sqrt()).to_vec(),
+            has_few_far: sites.iter().any(|site| stands_out(site, false)),
             profile_std: Some(
                 patches.map(|patch| (of(gains::mean_patch_mean(weights, patch)) + common).max(0.0).sqrt()),
             ),
@@ -335,6 +352,21 @@ impl Foreseen {
             ]),
         }
     }
+}
+
+/// Whether few photosites that stand out have a tenth of the variance or more: a normal law of all of it is too wide for the others.
+///
+/// Of those that are off by x, E x² ≥ (E x⁴)²/E x⁶ (Cauchy and Schwarz), where the fourth and the sixth cumulant are theirs: the least
+/// that they have. Of amplitudes that fall off exponentially they have 2.5 times that, a quarter. E x⁶/E x⁴ is the square of how far off
+/// they are; what is within three standard deviations does not stand out. Codes with a spread of less than half of one have such
+/// cumulants of being rounded.
+fn stands_out(site: &Prediction, is_codes: bool) -> bool {
+    const LEAST: f64 = 0.1;
+    const FAR: f64 = 3.0;
+    const SMOOTH: f64 = 0.5;
+    let (variance, fourth, sixth) = (site.moments.variance, site.fourth(), site.sixth);
+    let is_rounded = is_codes && variance < SMOOTH * SMOOTH;
+    fourth > 0.0 && sixth > FAR * FAR * variance * fourth && fourth * fourth >= LEAST * variance * sixth && !is_rounded
 }
 
 impl Likeness {

@@ -4,7 +4,7 @@ mod curves;
 mod places;
 mod sensors;
 
-pub(super) use places::{BUILT_IN, OF_SPECTRA, Place, directories, near_spectrum};
+pub(super) use places::{BUILT_IN, OF_SPECTRA, Place, directories, near_spectrum, without_data};
 pub use places::{DATA_VARIABLE, spectrum_file};
 pub(super) use sensors::known_cameras;
 pub use sensors::{DEFAULT_SENSOR, LoadedSensor, SensorChanges, load_changed_sensor, load_description, load_sensor};

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::formats::files::read_file;
+use crate::formats::own_program::own_program;
 use crate::formats::places::is_waited_on;
 use crate::names::nearest;
 use std::path::{Path, PathBuf};
@@ -67,7 +68,7 @@ pub(super) fn built_in(file: &str) -> Option<&'static [u8]> {
 pub(in crate::formats) fn directories() -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> =
         std::env::var_os(DATA_VARIABLE).map(|list| std::env::split_paths(&list).collect()).unwrap_or_default();
-    if let Ok(program) = std::env::current_exe() {
+    if let Ok(program) = own_program() {
         let above: Vec<&Path> = program.ancestors().skip(1).collect();
         found.extend(above.get(1).map(|prefix| prefix.join("share/cyanometer")));
         found.extend(above.iter().take(4).map(|directory| directory.join("sample_data")));
@@ -77,6 +78,20 @@ pub(in crate::formats) fn directories() -> Vec<PathBuf> {
 
 /// Directories of data directories in which spectra lie.
 pub(in crate::formats) const OF_SPECTRA: [&str; 2] = ["skies", "spectra"];
+
+/// Why a spectrum of no file here is none of the sample data either, and what helps; none where there are data.
+pub(in crate::formats) fn without_data(path: &Path) -> Option<String> {
+    let is_of_data = path.components().count() == 1 || path.starts_with("sample_data");
+    let has_spectra = |directory: &PathBuf| OF_SPECTRA.iter().any(|place| directory.join(place).is_dir());
+    if !is_of_data || directories().iter().any(has_spectra) {
+        return None;
+    }
+    let why = match own_program() {
+        Ok(_) => "the sample data are not installed beside the programs (`scripts/install` does that)".to_owned(),
+        Err(error) => format!("where the programs lie, and sample data with them, this system does not tell ({error})"),
+    };
+    Some(format!("{why}: let {DATA_VARIABLE} name their directory, or see `cyanometer demo`, which carries two skies"))
+}
 
 /// The file of a spectrum, a library or what is told of one: that of this name, or, of a bare name of no file where the program runs,
 /// that of a data directory.

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::formats::files::{read_file, sidecar_path};
 use crate::formats::format::SampleReader;
 use crate::formats::viewable::{Scaling, is_scale};
-use crate::formats::{register, yaml, yaml_guard};
+use crate::formats::{misspelt, register, yaml, yaml_guard};
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::stages::saturation::{MASK_LAYER, untold};
@@ -57,7 +57,7 @@ fn most_trusted(reader: &dyn SampleReader, name: &str, path: Option<&Path>, give
     if let Some(path) = given {
         let metadata = of_file(path)?;
         let shown = path.display().to_string();
-        yaml::check_misspelt(&shown, &metadata)?;
+        misspelt::check_misspelt(&shown, &metadata)?;
         // Ours were looked at when they were written, and a user may have changed them since.
         let doubts = if metadata.history.is_empty() { Vec::new() } else { metadata.doubts() };
         doubt_of_metadata(&shown, doubts.into_iter().chain(time_alone(&metadata)).chain(metadata.contradictions()));
@@ -67,7 +67,7 @@ fn most_trusted(reader: &dyn SampleReader, name: &str, path: Option<&Path>, give
         let (metadata, shown) = (of_file(&sidecar)?, sidecar.display().to_string());
         // Another version may have written it: what is unknown is kept.
         let time = time_alone(&metadata).filter(|_| metadata.history.is_empty());
-        let doubts = yaml::misspelt(&metadata).into_iter().chain(metadata.contradictions()).chain(time);
+        let doubts = misspelt::misspelt(&metadata).into_iter().chain(metadata.contradictions()).chain(time);
         let mut changed = changed_since(&metadata, reader);
         if changed.is_empty() {
             changed = tagged_otherwise(&metadata, reader);
@@ -258,14 +258,25 @@ pub(super) fn take_scaling(
         .embedded()
         .filter(|_| *found_in != FoundIn::Embedded)
         .and_then(|text| yaml::parse_metadata(name, text).ok());
-    let scale = embedded.map_or(found, |embedded| embedded.sample_scale).unwrap_or(1.0);
-    // Those of other programs are no powers of two.
-    let is_fine =
-        if *found_in == FoundIn::Tags { scale > 0.0 && to_sample(scale).is_normal() } else { is_scale(scale) };
-    if !is_fine {
+    let check = |scale: f64, name: &str, is_of_tags: bool| {
+        // Those of other programs are no powers of two.
+        let is_fine = if is_of_tags { scale > 0.0 && to_sample(scale).is_normal() } else { is_scale(scale) };
+        if is_fine {
+            return Ok(scale);
+        }
         let problem = format!("its `sample_scale`, {scale}, is no power of two, as 0.25 and 16 are");
-        return Err(Error::format(name, problem));
-    }
+        Err(Error::format(name, problem))
+    };
+    // That of other metadata must be one, though it may not count.
+    let told_by: &str = match found_in {
+        FoundIn::Given(file) | FoundIn::Sidecar(file) => file,
+        FoundIn::Embedded | FoundIn::Tags => name,
+    };
+    let found = found.map(|scale| check(scale, told_by, *found_in == FoundIn::Tags)).transpose()?;
+    let scale = match embedded {
+        Some(embedded) => check(embedded.sample_scale.unwrap_or(1.0), name, false)?,
+        None => found.unwrap_or(1.0),
+    };
     Ok(Scaling::of(reader.geometry().width, &reader.geometry().channels, scale))
 }
 

@@ -3,6 +3,7 @@
 use super::wire::{Answer, Head, MOST_ANSWER_BYTES};
 use super::{INSTEAD, SERVE, complete};
 use crate::error::{Error, Result};
+use crate::formats::own_program::own_program;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::resource::{Resource, getrlimit};
 use nix::sys::signal::Signal;
@@ -10,6 +11,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::os::fd::AsFd;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::Path;
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
@@ -69,8 +71,9 @@ impl Worker {
     /// The command that starts this program as a child. What the environment says does not reach it.
     fn command(limits: Limits) -> io::Result<Command> {
         // The file of the program may have been replaced since it was started.
-        let program: std::path::PathBuf =
-            if cfg!(target_os = "linux") { "/proc/self/exe".into() } else { std::env::current_exe()? };
+        let kept = Path::new("/proc/self/exe");
+        let is_kept = cfg!(target_os = "linux") && kept.exists();
+        let program = if is_kept { kept.to_owned() } else { own_program()? };
         let mut command = Command::new(program);
         let threads = rayon::current_num_threads();
         let numbers = [limits.memory_bytes, limits.processor_s, threads as u64, std::process::id().into()];

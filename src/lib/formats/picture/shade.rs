@@ -168,7 +168,10 @@ impl Shade {
             unit if unit.is_empty() => unit,
             unit => format!(" {unit}"),
         };
+        // Linear sRGB at its own range is the same picture as that of sRGB.
+        let is_whole = frame.metadata.quantity == QuantityKind::LinearSrgb;
         match self {
+            Self::Planes(ranges) if is_whole && **ranges == [(0.0, 1.0); 3] && white(frame).is_some() => white(frame),
             Self::Planes(ranges) if ranges.iter().all(|range| *range == ranges[0]) => {
                 let (low, high) = ranges[0];
                 let [low, high] = apart(low, high, level);
@@ -186,18 +189,7 @@ impl Shade {
                 let [low, high] = apart(*low, *high, level);
                 Some(format!("black {low}, white {high}{unit}"))
             }
-            Self::Xyz(..) | Self::Encoded => {
-                let color = frame.metadata.color.as_ref()?;
-                let [_, luminance, _] = color.white?;
-                // Relative XYZ have no luminance.
-                let is_relative = color.range_adu.is_some() || frame.metadata.unit == "relative";
-                let luminance = level(luminance);
-                Some(if is_relative {
-                    format!("white Y = {luminance}")
-                } else {
-                    format!("white {luminance} cd m⁻²")
-                })
-            }
+            Self::Xyz(..) | Self::Encoded => white(frame),
         }
     }
 
@@ -385,6 +377,16 @@ pub(super) fn one_range(frame: &FrameHeader, range: Range, choice: &Choice, redu
     }
 }
 
+/// What the white of a picture of colors is, where the frame tells it.
+fn white(frame: &FrameHeader) -> Option<String> {
+    let color = frame.metadata.color.as_ref()?;
+    let [_, luminance, _] = color.white?;
+    // Relative XYZ have no luminance.
+    let is_relative = color.range_adu.is_some() || frame.metadata.unit == "relative";
+    let luminance = level(luminance);
+    Some(if is_relative { format!("white Y = {luminance}") } else { format!("white {luminance} cd m⁻²") })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -403,14 +405,18 @@ mod tests {
 
     #[test]
     fn the_white_of_relative_colors_has_no_luminance() {
-        let words = |range_adu| {
-            let mut metadata = Metadata::new(QuantityKind::Srgb);
+        let told = |quantity, shade: &Shade, range_adu| {
+            let mut metadata = Metadata::new(quantity);
             let white = Some([0.95, 1.0, 1.09]);
             metadata.color = Some(ColorRecord { white, range_adu, ..ColorRecord::of_xyz() });
             let frame = FrameHeader { name: "f".into(), geometry: Geometry::new(4, 4, &["R", "G", "B"]), metadata };
             let choice = Choice::of(&frame, None, false).unwrap();
-            Shade::Encoded.words(&frame, &choice).unwrap()
+            shade.words(&frame, &choice).unwrap()
         };
+        let words = |range_adu| told(QuantityKind::Srgb, &Shade::Encoded, range_adu);
         assert_eq!([None, Some([900.0; 3])].map(words), ["white 1 cd m⁻²", "white Y = 1"]);
+        // Linear sRGB from 0 to 1 is the same picture; stretched it is not.
+        let linear = |range| told(QuantityKind::LinearSrgb, &Shade::Planes(vec![range; 3]), None);
+        assert_eq!([(0.0, 1.0), (0.0, 0.5)].map(linear), ["white 1 cd m⁻²", "black 0, white 0.5"]);
     }
 }

@@ -30,6 +30,7 @@ pub(super) fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
     let (mut highest, mut heaped, mut laws) = (0.0_f64, 0.0_f64, Vec::new());
     let (mut beyond, mut all, mut farthest) = (0, 0, 0.0_f64);
     let mut piles = Vec::new();
+    let mut is_far = false;
     for bins in &groups {
         let pile = Pile::of(&bins.bins);
         for bin in bins.shown(window) {
@@ -41,7 +42,9 @@ pub(super) fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
         let name = with_means(bins.group, &scale.unit);
         panel.add(&name, bins.color, Marks::Line(bins.steps(window)));
         piles.extend(pile.map(|pile| pile.words(&bins.group.name)));
-        if let Some(foreseen) = bins.group.predicted.as_ref().filter(|_| pile.is_none()) {
+        let foreseen = bins.group.predicted.as_ref().filter(|_| pile.is_none());
+        is_far |= foreseen.is_some_and(|foreseen| foreseen.has_few_far);
+        if let Some(foreseen) = foreseen.filter(|foreseen| !foreseen.has_few_far) {
             laws.push((words_of_law(foreseen, portrait.is_whole), bins.law(foreseen, portrait.is_whole)));
         }
         let outside = bins.beyond(window);
@@ -64,7 +67,14 @@ pub(super) fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
     }
     panel.x = panel.x.range(window[0], window[1]);
     let words = outside(beyond, all, "samples", farthest);
-    panel.title = [words].into_iter().chain(piles).filter(|words| !words.is_empty()).collect::<Vec<_>>().join("; ");
+    let no_law = if is_far { "no law drawn: few photosites far off make its spread" } else { "" };
+    panel.title = [words]
+        .into_iter()
+        .chain(piles)
+        .chain([no_law.to_owned()])
+        .filter(|words| !words.is_empty())
+        .collect::<Vec<_>>()
+        .join("; ");
     panel
 }
 

@@ -76,7 +76,9 @@ impl SeenLibrary {
 fn labels(fit: &Fit) -> Result<Vec<String>> {
     match &fit.labels {
         Some((file, column)) => {
-            csv::text_column(&file.display().to_string(), &files::read_file(&spectrum_file(file))?, column)
+            let found = spectrum_file(file);
+            let bytes = files::read_file(&found).map_err(|error| spectral::with_near_name(error, Some(&found)))?;
+            csv::text_column(&file.display().to_string(), &bytes, column)
         }
         None if fit.hold_out.is_empty() => Ok(Vec::new()),
         None => Err(Error::Usage("--hold-out names labels; give them with --labels FILE:COLUMN".into())),

@@ -4,12 +4,16 @@ use super::picture::Picture;
 use crate::camera::response::Camera;
 use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
+use crate::formats::radiance_unit::{Brightness, times_white};
 use crate::formats::spectral::SpectralChannels;
+use crate::frame::to_sample;
 use crate::numerics::planes::{WeightedPlane, weighted_sums};
+use crate::requests::notes::Note;
 use crate::stages::render::Rendering;
 use crate::stream::{Band, Outlet, RowSink, RowSource, fold, fold_into};
-use crate::units::Any;
+use crate::units::{Any, RadianceUnit};
 use rayon::prelude::*;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Where the light comes from, once opened.
 pub(super) enum Light {
@@ -31,10 +35,62 @@ pub(super) enum ImageRows {
 
 /// How the pixels of an image become signal electrons.
 pub(super) enum Pixels {
-    /// As sums of its planes.
-    Spectral(Vec<WeightedPlane>),
+    /// As sums of its planes; how bright they are may be judged meanwhile.
+    Spectral(Vec<WeightedPlane>, Option<Judged>),
     /// As colors.
     Colored(Box<Picture>),
+}
+
+/// How bright the pixels of a spectral image are in the unit that they are taken to have.
+#[derive(Clone)]
+pub(super) struct Judged {
+    name: String,
+    unit: RadianceUnit,
+    is_assumed: bool,
+    /// What a sample of 1 is in white clouds, by the place of the plane.
+    scales: Vec<(usize, f32)>,
+    seen: Arc<Mutex<Brightness>>,
+}
+
+impl Judged {
+    /// That of an image `name`, of the planes that count.
+    pub(super) fn new(name: &str, spectral: &SpectralChannels, planes: &[WeightedPlane]) -> Self {
+        let scale_of = |(&plane, &nm): (&usize, &f64)| {
+            let counts = planes.iter().any(|weighted| weighted.plane == plane);
+            counts.then(|| (plane, to_sample(times_white(spectral.unit.in_w_per_cm2_sr_nm(nm)))))
+        };
+        Self {
+            name: name.to_owned(),
+            unit: spectral.unit,
+            is_assumed: spectral.is_assumed,
+            scales: spectral.channels.iter().zip(&spectral.wavelength_nm).filter_map(scale_of).collect(),
+            seen: Arc::default(),
+        }
+    }
+
+    /// Looks at a row of planes of `width` samples; refuses one that is too bright where the unit is assumed.
+    fn see(&self, samples: &[f32], width: usize) -> Result<()> {
+        let mut times = vec![0.0_f32; width];
+        for (plane, scale) in &self.scales {
+            for (times, sample) in times.iter_mut().zip(&samples[plane * width..][..width]) {
+                let value = sample * scale;
+                *times = if value > *times { value } else { *times };
+            }
+        }
+        let row = Brightness::of(times.into_iter().map(f64::from));
+        if self.is_assumed {
+            return row.judge(&self.name, self.unit, true).map(|_| ());
+        }
+        let mut all = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        *all = all.plus(row);
+        Ok(())
+    }
+
+    /// A warning of pixels that were seen, where the unit is stated.
+    pub(super) fn note(&self) -> Option<Note> {
+        let all = *self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        all.judge(&self.name, self.unit, false).ok().flatten().map(Note::Warning)
+    }
 }
 
 /// An image whose pixels become signal electrons.
@@ -119,14 +175,18 @@ impl Pixels {
         let window = band.window::<Any>(0);
         let of_row = |y: usize| {
             let row = match self {
-                Self::Spectral(planes) => {
+                Self::Spectral(planes, _) => {
                     let mut row = Vec::with_capacity(window.width());
                     weighted_sums(window.all_channels(y), window.width(), planes, |electrons| row.push(electrons));
                     row
                 }
                 Self::Colored(picture) => picture.electrons(window.all_channels(y), window.width(), first + y, name)?,
             };
-            row.into_iter().map(|electrons| checked(electrons, name)).collect()
+            let row = row.into_iter().map(|electrons| checked(electrons, name)).collect::<Result<_>>()?;
+            if let Self::Spectral(_, Some(judged)) = self {
+                judged.see(window.all_channels(y), window.width())?;
+            }
+            Ok(row)
         };
         band.rows().into_par_iter().map(of_row).collect()
     }

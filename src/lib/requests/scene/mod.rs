@@ -21,7 +21,7 @@ use crate::stages::render::Rendering;
 use crate::stages::saturation::{Counted, FullLevels};
 use crate::stream::{Counts, MemoryFrame, RowSink};
 use crate::text::counted;
-use light::Light;
+use light::{Judged, Light};
 use open::Prepared;
 use picture::Losses;
 
@@ -30,6 +30,7 @@ pub struct OpenScene {
     rendering: Rendering,
     light: Light,
     losses: Losses,
+    judged: Option<Judged>,
     /// What came up.
     pub notes: Vec<Note>,
 }
@@ -63,7 +64,7 @@ impl Scene {
         let rendering = self.rendering(&prepared)?;
         let Prepared { light, mut found, .. } = prepared;
         found.notes.extend(self.cut(&light));
-        Ok(OpenScene { rendering, light, losses: found.losses, notes: found.notes })
+        Ok(OpenScene { rendering, light, losses: found.losses, judged: found.judged, notes: found.notes })
     }
 
     /// Renders the frame into memory.
@@ -118,7 +119,7 @@ impl OpenScene {
     ///
     /// Those of reader and sink.
     pub fn draw(self, sink: &mut dyn RowSink, progress: &mut dyn FnMut(usize)) -> Result<(Counts, Vec<Note>)> {
-        let Self { rendering, light, losses, .. } = self;
+        let Self { rendering, light, losses, judged, .. } = self;
         // Of a uniform scene it was said before.
         let is_known = matches!(light, Light::Uniform { .. });
         let mut counts = Counts::default();
@@ -134,7 +135,8 @@ impl OpenScene {
         let text = "samples expect full well or more, and will be saturated; a shorter exposure, or --expose-to 0.8 in place of \
                     --exposure, keeps them below";
         let saturated = (full > 0 && !is_known).then(|| Note::Warning(counted(full, text)));
-        Ok((counts, losses.note().into_iter().chain(saturated).collect()))
+        let bright = judged.and_then(|judged| judged.note());
+        Ok((counts, losses.note().into_iter().chain(bright).chain(saturated).collect()))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Opens the light of a scene, and settles its exposure.
 
-use super::light::{ImageRows, Light, Pixels, SceneImage, brightest, checked, no_sample};
+use super::light::{ImageRows, Judged, Light, Pixels, SceneImage, brightest, checked, no_sample};
 use super::picture;
 use super::request::Scene;
 use super::sums::{Found, Sums, gap};
@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::formats::csv::SpectralTable;
 use crate::formats::data::{LoadedSensor, spectrum_file};
 use crate::formats::input::{FrameReader, InputOptions};
+use crate::formats::radiance_unit::{Brightness, times_white};
 use crate::formats::spectral::{self, Radiances, SpectralChannels};
 use crate::frame::Geometry;
 use crate::requests::notes::{self, Note};
@@ -158,7 +159,10 @@ impl Scene {
             found.metadata.leave_out("render-radiance", what, "no class responds to them");
         }
         let Geometry { width, height, .. } = header.geometry;
-        let mut image = SceneImage::new(reader, Pixels::Spectral(planes));
+        // Of a chosen pixel the others do not matter.
+        let is_drawn = self.spectrum.sample.is_none();
+        found.judged = is_drawn.then(|| Judged::new(&header.name, &spectral, &planes));
+        let mut image = SceneImage::new(reader, Pixels::Spectral(planes, found.judged.clone()));
         let Some(sample) = self.spectrum.sample else {
             let (first, radiance) = image.first_row(&spectral)?;
             found.metadata.quadrature_error = seen.quadrature_error(&radiance);
@@ -169,6 +173,10 @@ impl Scene {
             return Err(no_sample(&header.name, sample, width * height));
         }
         let (electrons, radiance) = image.pixel([sample % width, sample / width], &spectral)?;
+        let brightest = radiance.iter().copied().fold(0.0, f64::max);
+        let bright =
+            Brightness::of([times_white(brightest)]).judge(&header.name, spectral.unit, spectral.is_assumed)?;
+        found.notes.extend(bright.map(Note::Warning));
         found.metadata.quadrature_error = seen.quadrature_error(&radiance);
         found.radiance = Some(SpectralLibrary::of_one(between.wavelength_nm, radiance));
         Ok(Light::Uniform { electrons, source: format!("{}: sample {sample}", header.name) })

@@ -1,6 +1,6 @@
 //! Sums over wavelengths that turn radiance into electrons, and what comes up with them.
 
-use super::light::Seen;
+use super::light::{Judged, Seen};
 use super::picture::Losses;
 use crate::analysis::characterization::stimuli;
 use crate::camera::optics::Exposure;
@@ -26,13 +26,15 @@ pub(super) struct Found {
     /// How the spectra of a picture are made up, and what is lost of its colors on the way.
     pub(super) upsampling: Option<UpsamplingRecord>,
     pub(super) losses: Losses,
+    /// How bright the pixels of a spectral image are that is drawn.
+    pub(super) judged: Option<Judged>,
 }
 
 impl Found {
     /// Nothing yet.
     pub(super) fn none() -> Self {
         let metadata = Metadata::new(QuantityKind::ExpectedElectrons);
-        Self { metadata, notes: Vec::new(), radiance: None, upsampling: None, losses: Losses::default() }
+        Self { metadata, notes: Vec::new(), radiance: None, upsampling: None, losses: Losses::default(), judged: None }
     }
 }
 
