@@ -24,6 +24,7 @@ pub mod input;
 mod interleave;
 pub mod inventory;
 pub mod keys;
+mod large;
 mod ljpeg;
 pub mod makers;
 pub mod many;
