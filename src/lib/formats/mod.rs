@@ -44,6 +44,7 @@ mod remarks;
 mod response_import;
 pub mod response_table;
 pub mod resume;
+mod rounded;
 pub mod sequence;
 mod settings;
 pub mod spectral;
