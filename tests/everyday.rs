@@ -160,6 +160,16 @@ fn a_light_by_wavenumber_is_refused_whatever_its_rows_are() {
 }
 
 #[test]
+fn the_matrix_of_the_sensor_is_named_as_for_predictions() {
+    let shop = Workshop::with_frames();
+    let own = told(&shop, "to-xyz rgb.exr -o own.exr");
+    assert_eq!(told(&shop, "to-xyz rgb.exr --matrix sensor -o named.exr"), own);
+    assert_eq!(shop.frame("own.exr").samples, shop.frame("named.exr").samples);
+    let refused = shop.said("to-xyz named.exr --matrix sensor --space lab -o lab.exr", BAD_USAGE);
+    assert!(refused.contains("leave out --matrix"), "{refused}");
+}
+
+#[test]
 fn what_is_typed_wrong_is_told_what_it_may_be() {
     let shop = Workshop::with_frames();
     for (line, status, wanted) in [

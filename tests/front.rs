@@ -131,6 +131,7 @@ fn values_that_are_known_by_name_are_completed() {
         ("to-xyz", "white", &["d50", "e"], "X", false),
         ("to-xyz", "adapt-to", &["d75"], "LIGHT", false),
         ("predict-noise", "matrix", &["sensor"], "FILE", true),
+        ("to-xyz", "matrix", &["sensor"], "FILE", true),
         ("demosaic", "cfa", &["grbg"], "PATTERN", false),
         ("demosaic", "black", &["auto", "none"], "N", false),
     ] {

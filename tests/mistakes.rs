@@ -10,7 +10,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 132] = [
+const MISTAKES: [(&str, i32, &str); 134] = [
     (
         "preview codes.exr plane.exr -o {steam}.png",
         BAD_USAGE,
@@ -420,6 +420,18 @@ const MISTAKES: [(&str, i32, &str); 132] = [
         BAD_DATA,
         "expected.exr: it holds three planes of expected electrons, neither spectral radiance nor a picture in R, G, B; it is rendered \
          already, for `add-noise`",
+    ),
+    (
+        "add-noise expected.exr --temperature 20",
+        BAD_USAGE,
+        "`20` is no value for --temperature <K>: give a temperature in K, above 0; 20 looks like degrees Celsius, which is 293.15 K; see \
+         `add-noise --help`",
+    ),
+    (
+        "predict-noise --dark --temperature 69.9",
+        BAD_USAGE,
+        "`69.9` is no value for --temperature <K>: give a temperature in K, above 0; 69.9 looks like degrees Celsius, which is 343.05 K; \
+         see `predict-noise --help`",
     ),
     (
         "add-noise expected.exr --temperature 25C",

@@ -295,6 +295,21 @@ fn a_clipped_blue_is_known_to_the_end() {
     assert_eq!(shop.frame("s.tiff").header.geometry.channels, ["R", "G", "B"]);
 }
 
+/// An average says how many of its pixels are saturated, whether its format marks them or not.
+#[test]
+fn averages_tell_of_saturation_in_every_format() {
+    let shop = Workshop::new();
+    shop.run("render-radiance --electrons 15000,25000,60000 --size 20x10 -o e.exr", &[]);
+    shop.run("add-noise e.exr --frames 0..3 -o n{frame}.exr", &[]);
+    for name in ["mean.exr", "mean.tiff"] {
+        let output = shop.attempt(&format!("average-frames n0.exr n1.exr n2.exr -o {name}"), &[]);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && text.contains("200 pixels were made of saturated samples"), "{text}");
+        let sidecar = String::from_utf8(shop.bytes(&format!("{name}.yaml"))).unwrap();
+        assert!(sidecar.contains("saturated: 200"), "{sidecar}");
+    }
+}
+
 /// Who looks at a frame hears of its marks, as often as the layer has them.
 #[test]
 fn pictures_and_differences_tell_of_marked_pixels() {

@@ -450,6 +450,56 @@ fn false_alarms_are_no_more_than_the_level() {
     }
 }
 
+/// A few jumps do not tell how far off samples are that full well or single counts leave off: honest frames raise no alarm, of two
+/// samples too that are off at the same place.
+#[test]
+fn tails_of_other_reasons_are_no_alarm() {
+    let few = |full_well_e: f64, amplitude_e: f64| {
+        move |readout: &mut ReadOut| {
+            readout.dark_current_na_per_cm2 = None;
+            readout.dark_current_e_per_s = Some(0.0);
+            (readout.dcnu, readout.prnu, readout.read_noise_e) = (0.0, 0.0, 0.01);
+            readout.full_well_e = full_well_e;
+            (readout.bits, readout.bias_adu, readout.adu_per_e) = (12, 100.0, 0.19);
+            (readout.rts_share, readout.rts_amplitude_e) = (1e-4, amplitude_e);
+        }
+    };
+    let cases = [
+        ("full well", scene([24, 18], [552.0; 3], few(500.0, 3.0))),
+        ("single counts", scene([64, 64], [0.01; 3], few(20_000.0, 0.5))),
+    ];
+    for (what, scene) in cases {
+        for seed in 1..=60 {
+            let region = report(&noisy(&scene, &settings(seed)));
+            assert!(!region.tests.is_empty() && corrected(&region) > 1e-4, "{what}, {seed}: {:#?}", region.tests);
+        }
+    }
+}
+
+/// Where rare hot photosites make up a covariance, planes that are copies of each other are told all the same.
+#[test]
+fn copies_are_told_beside_hot_photosites() {
+    let rare = |readout: &mut ReadOut| {
+        tailed(readout);
+        (readout.hot_pixel_share, readout.hot_pixel_dark_current_e_per_s) = (0.01, 20_000.0);
+    };
+    // 1600 of them in a plane, enough for the law of a variance; the excess kurtosis of a photosite is 500, that of a product 2.
+    const SIZE: [usize; 2] = [440, 360];
+    let scene = scene(SIZE, [500.0; 3], rare);
+    let honest = noisy(&scene, &settings(3));
+    let correlations = |frame: &MemoryFrame| {
+        let tests = report(frame).tests.into_iter().filter(|test| test.channels.len() == 2);
+        tests.map(|test| test.p).collect::<Vec<_>>()
+    };
+    assert!(matches!(correlations(&honest)[..], [a, b, c] if a.min(b).min(c) > 0.01), "{:?}", correlations(&honest));
+    let mut copied = MemoryFrame::new(honest.header.clone(), honest.samples.clone());
+    let [width, _] = SIZE;
+    copied.samples.chunks_mut(3 * width).for_each(|row| row.copy_within(width..2 * width, 2 * width));
+    // (3 + κ)/z⁴ with z² = 158 400.
+    let told = correlations(&copied).iter().filter(|p| **p < 1e-8).count();
+    assert_eq!(told, 1, "{:?}", correlations(&copied));
+}
+
 /// What is not predicted is refused by name.
 #[test]
 fn what_is_beyond_is_named() {

@@ -302,3 +302,28 @@ fn units_that_are_no_codes_are_refused_unless_metadata_say_so() {
     write(&shop, "codes.fits", [900, 1], &[("BUNIT", "'counts'"), ("EXPTIME", "2.0")]);
     shop.run("demosaic codes.fits --black 0 -o a.exr", &[]);
 }
+
+/// Integers of 32 bits that differ by less than single precision tells are told; those of a sum of exposures are not.
+#[test]
+fn integers_that_single_precision_makes_alike_are_told() {
+    let shop = Workshop::new();
+    let write = |name: &str, of: fn(i32) -> i32| {
+        let cards = [("SIMPLE", "T"), ("BITPIX", "32"), ("NAXIS", "2"), ("NAXIS1", "16"), ("NAXIS2", "12")];
+        let cards = cards.map(|(key, value)| format!("{:<80}", format!("{key:<8}= {value}"))).concat();
+        let mut bytes = format!("{cards}{:<80}{:<80}", "BAYERPAT= 'RGGB'", "END").into_bytes();
+        bytes.resize(2880, b' ');
+        bytes.extend((0..16 * 12).flat_map(|place| of(place).to_be_bytes()));
+        bytes.resize(2 * 2880, 0);
+        fs::write(shop.path(name), bytes).unwrap();
+    };
+    write("near.fits", |place| 1_000_000_000 + place % 64);
+    write("sum.fits", |place| 60_000_000 + place * 7919 % 10_007);
+    write("codes.fits", |place| 900 + place % 2);
+    // Single precision has steps of 64 there.
+    let near = shop.said("measure near.fits", 0);
+    assert!(near.contains("near.fits: its samples have more digits than single precision"), "{near}");
+    assert_eq!(near.matches("more digits").count(), 1, "{near}");
+    for name in ["sum.fits", "codes.fits"] {
+        assert!(!shop.said(&format!("measure {name}"), 0).contains("more digits"), "{name}");
+    }
+}

@@ -3,7 +3,7 @@
 use crate::layout::SCHEMA;
 use crate::layout::{CHANNEL, LAYER, MASK, METADATA, Part, SAMPLES, SIGMA, Shards, parts};
 use cyanometer::error::{Error, Result};
-use cyanometer::formats::atomic::AtomicDirectory;
+use cyanometer::formats::atomic::{AtomicDirectory, filling};
 use cyanometer::formats::digest::SamplesDigest;
 use cyanometer::formats::format::SampleType;
 use cyanometer::formats::output::{SampleKind, doubt_of_codes};
@@ -172,6 +172,7 @@ impl StackWriter {
             },
             "consolidated_metadata": {"kind": "inline", "must_understand": false, "metadata": arrays},
         });
+        let _one = filling();
         std::fs::write(path.join(STACK_DESCRIPTION), format!("{group:#}\n")).map_err(failed)
     }
 
@@ -415,6 +416,7 @@ fn built(
 
 fn describe(array: &Array<FilesystemStore>, name: &str) -> Result<()> {
     let options = ArrayMetadataOptions::default().with_include_zarrs_metadata(false);
+    let _one = filling();
     array.store_metadata_opt(&options).map_err(|error| of_storage(name, &error))
 }
 
@@ -437,6 +439,7 @@ fn store<'a>(
     let options = CodecOptions::default()
         .with_concurrent_target(rayon::current_num_threads())
         .with_store_empty_chunks(elements.is_fill_value(array.fill_value()));
+    let _one = filling();
     array.store_chunk_opt(indices, elements, &options).map_err(|error| match &error {
         ArrayError::StorageError(error) => of_storage(name, error),
         other => unwritable(name, other),

@@ -12,23 +12,33 @@ use std::fs::{File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, IsTerminal, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError, TryLockError};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use tempfile::TempPath;
 
 /// Temporary names to remove when the program is ended. Whoever makes one holds the lock until it stands here, and whoever
 /// gives files their names holds it until all have them, so that a signal comes before or after.
 static PENDING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
+/// Held by whoever makes a file in a directory that has no name of its own yet, one file at a time, and by whoever ends the program.
+static FILLING: Mutex<()> = Mutex::new(());
+
 /// What temporary names begin with.
 const PREFIX: &str = ".cyanometer-";
+
+/// Lets a file be made in an [`AtomicDirectory`]: none is any more once a signal has come, or the directory would be filled while it
+/// is removed, and stay. To be held for one file at a time, as a signal waits for it.
+pub fn filling() -> MutexGuard<'static, ()> {
+    FILLING.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Removes what is half-written, for whoever ends the program at a signal; waits until files that are complete have their
 /// names, and lets none be made any more.
 pub fn remove_pending() {
+    let filling = filling();
     let pending = PENDING.lock().unwrap_or_else(PoisonError::into_inner);
     remove(&pending);
     // Held until the program has ended.
-    std::mem::forget(pending);
+    std::mem::forget((filling, pending));
 }
 
 /// The same after a panic, which may have come while files got their names: then they get them.
@@ -495,6 +505,37 @@ mod tests {
         }
         drop(AtomicFile::begin(&target, |_, _| None).unwrap());
         assert_eq!((names(), std::fs::read(&target).unwrap()), (vec!["out.exr".to_owned()], vec![1]));
+    }
+
+    /// While a thread makes files in it, and the directories on the way, as one that writes a stack does until the program has ended.
+    #[test]
+    fn a_directory_goes_while_it_is_being_filled() {
+        use std::sync::atomic::{AtomicBool, Ordering};
+        for _ in 0..20 {
+            let directory = tempfile::tempdir().unwrap();
+            let filled = directory.path().join("filled");
+            let (ends, begun) = (AtomicBool::new(false), std::sync::Barrier::new(2));
+            std::thread::scope(|scope| {
+                scope.spawn(|| {
+                    let fill = |index: u32| {
+                        let _one = filling();
+                        std::fs::create_dir_all(filled.join("part")).unwrap();
+                        std::fs::write(filled.join("part").join(index.to_string()), [0]).unwrap();
+                    };
+                    (0..50).for_each(fill);
+                    begun.wait();
+                    (50..).take_while(|_| !ends.load(Ordering::Relaxed)).for_each(fill);
+                });
+                begun.wait();
+                let stopped = filling();
+                remove(std::slice::from_ref(&filled));
+                std::thread::sleep(std::time::Duration::from_millis(1));
+                let is_there = filled.exists();
+                ends.store(true, Ordering::Relaxed);
+                drop(stopped);
+                assert!(!is_there);
+            });
+        }
     }
 
     #[test]

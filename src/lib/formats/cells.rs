@@ -3,6 +3,7 @@
 use super::delimited::{self, Separator, decimal, number};
 use super::foreign::{csv_complaint, line_of};
 use super::keys;
+use super::large::Large;
 use super::thousands::{Points, Thousands};
 use crate::error::{Error, Result};
 use crate::units::WavelengthUnit;
@@ -61,6 +62,7 @@ impl Cells {
         let mut spoiled = BTreeMap::new();
         let [mut has_points, mut has_commas] = [false; 2];
         let mut thousands = Thousands::default();
+        let mut large = Large::of(by_rows);
         // One row at a time: as text a table takes many times the memory of its numbers.
         while std::mem::take(&mut at_hand)
             || reader.read_record(&mut record).map_err(|e| csv_complaint(name, text, &e))?
@@ -80,7 +82,9 @@ impl Cells {
                 if !(by_rows && column == 0) {
                     thousands.take(if by_rows { 1 } else { column }, cell, line);
                 }
-                numbers.push(match value.filter(|value| by_rows && column == 0 || !is_fill(*value)) {
+                let mark = || format!("line {}, column {}{}", line(), column + 1, fills(cell));
+                let mut is_value = |value: f64| !is_fill(value) || large.take(value, [rows - 1, column], mark);
+                numbers.push(match value.filter(|value| by_rows && column == 0 || is_value(*value)) {
                     Some(value) => value,
                     // The label of a row need not be a number.
                     None if by_rows && column == 0 => 0.0,
@@ -105,8 +109,9 @@ impl Cells {
             return Err(refuse("its numbers have decimal points and decimal commas; write all with a point".into()));
         }
         thousands.check(name, separator)?;
-        let numbers =
+        let mut numbers =
             Array2::from_shape_vec((rows, width), numbers).map_err(|_| refuse("its rows differ in length".into()))?;
+        large.judge(&mut numbers, &mut spoiled).map_err(refuse)?;
         let curves = if by_rows { rows } else { width.saturating_sub(1) };
         match spoiled.first_key_value() {
             Some((_, problem)) if spoiled.len() == curves => Err(refuse(problem.clone())),

@@ -41,6 +41,5 @@ fn expose(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     let cli::Turn { session, input, output, exposure } = *turn;
     let mut reader = arguments.input.with(input.clone()).open()?;
     session.tell(&arguments.sensor.apply(&mut reader)?);
-    session.tell(arguments.noise.choice.doubt().as_slice());
     session.expose(reader, &arguments.noise.settings(exposure), exposure, output)
 }

@@ -60,8 +60,7 @@ fn write(arguments: &Arguments, session: &cli::Session, average: SharedAverage) 
     let layers = output.options().holds_layers()?;
     let counts = session.write(&averaged.marked(layers), output, |writer, progress| {
         let propagation_void = averaged.write(layers, writer, progress)?;
-        let saturated_pixels = if layers { 0 } else { averaged.saturated };
-        Ok(Counts { propagation_void, saturated_pixels, ..Counts::default() })
+        Ok(Counts { propagation_void, saturated_pixels: averaged.saturated, ..Counts::default() })
     })?;
     counts.map_or_else(Vec::new, Counts::warnings).iter().for_each(|warning| session.warn(warning));
     Ok(())

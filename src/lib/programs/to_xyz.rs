@@ -45,7 +45,7 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let Arguments { conversion, output, .. } = arguments;
     session.tell(conversion.doubt_of(output).as_slice());
     announce(&[output.output.as_deref()])?;
-    check_inputs(conversion.matrix.as_deref().map(Some).into_iter().chain([arguments.input.path()]))?;
+    check_inputs(conversion.matrix_file().map(Some).into_iter().chain([arguments.input.path()]))?;
     let matrix = conversion.load_matrix()?;
     session.each_frame::<Arguments>(&arguments.input, output, |turn| convert(arguments, matrix.clone(), turn))
 }

@@ -18,13 +18,16 @@ use crate::stages::to_xyz::{ColorSettings, ToXyz, needs_white};
 use crate::stream::RowSource;
 use crate::units::{QuantityKind, RELATIVE_UNIT};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Y of a relative white that must be one in cd/m².
 const BRIGHT_WHITE: f64 = 10.0;
 /// Y of a white in cd/m² that must be a relative one, or a chromaticity.
 const RELATIVE_WHITE: f64 = 2.0;
+
+/// What stands for the matrix of the sensor in place of the name of a file.
+pub(super) const OF_SENSOR: &str = "sensor";
 
 /// Which colors are made of a frame, and by which matrix.
 #[derive(Debug, Clone, Args)]
@@ -35,9 +38,9 @@ const RELATIVE_WHITE: f64 = 2.0;
     "Luminance of the white d65, d50 or e in cd/m2; by default that at which the camera saturates, or of XYZ what they record. Of relative XYZ it is 1"
 )))]
 pub struct Conversion {
-    /// Matrix file, as fit-matrix or import-raw --write-matrix makes it; by default that of the frame's sensor, or of the raw
-    /// file that it comes from
-    #[arg(long, value_name = "FILE")]
+    /// Matrix file, as fit-matrix or import-raw --write-matrix makes it, or `sensor` for that of the frame's sensor; by default that,
+    /// or that of the raw file that it comes from
+    #[arg(long, value_name = "FILE|sensor")]
     pub matrix: Option<PathBuf>,
     /// Color space; cct is correlated color temperature in K, Duv and Y; linear-srgb is neither clipped nor encoded
     #[arg(long, default_value = Space::Xyz.name(), value_parser = values::choice::<Space>())]
@@ -77,13 +80,18 @@ impl Conversion {
         (self.space == Space::Srgb && output.is_exr()).then(|| Note::Warning(text.into()))
     }
 
+    /// The file of the matrix, where one is named.
+    pub fn matrix_file(&self) -> Option<&Path> {
+        self.matrix.as_deref().filter(|path| *path != Path::new(OF_SENSOR))
+    }
+
     /// The matrix of a file, before any frame is waited for.
     ///
     /// # Errors
     ///
     /// Those of [`data::load_matrix`].
     pub fn load_matrix(&self) -> Result<Option<CameraMatrix>> {
-        self.matrix.as_deref().map(data::load_matrix).transpose()
+        self.matrix_file().map(data::load_matrix).transpose()
     }
 
     /// The stage that converts a frame, into whose metadata the chosen black level and exposure go; with what came up.
@@ -102,6 +110,7 @@ impl Conversion {
         let mut notes = Vec::new();
         let matrix = match matrix {
             Some(matrix) => matrix,
+            None if self.matrix.is_some() && self.matrix_file().is_none() => matrix_of_sensor(frame)?,
             None => {
                 let (matrix, note) = own_matrix(frame)?;
                 notes.push(note);
@@ -228,7 +237,8 @@ impl Conversion {
     fn doubts(&self, matrix: &CameraMatrix, frame: &FrameHeader) -> Vec<Note> {
         let mut notes = Vec::new();
         let mut known = frame.metadata.camera_names().peekable();
-        if let (Some(file), Some(of_matrix), Some(of_frame)) = (&self.matrix, &matrix.sensor, known.peek().copied())
+        if let (Some(file), Some(of_matrix), Some(of_frame)) =
+            (self.matrix_file(), &matrix.sensor, known.peek().copied())
             && known.all(|name| !name.eq_ignore_ascii_case(of_matrix))
         {
             let shown = file.display();
@@ -236,15 +246,14 @@ impl Conversion {
             notes.push(Note::Warning(text));
         }
         let sensor = frame.metadata.sensor.as_ref();
-        if let Some((file, doubt)) = self.matrix.as_ref().zip(sensor.and_then(|sensor| matrix.doubt_of_sensor(sensor)))
-        {
+        if let Some((file, doubt)) = self.matrix_file().zip(sensor.and_then(|sensor| matrix.doubt_of_sensor(sensor))) {
             notes.push(Note::Warning(format!("{} {doubt}", file.display())));
         }
-        let shown = self.matrix.as_ref().map_or("the matrix of its sensor".into(), |file| file.display().to_string());
+        let shown = self.matrix_file().map_or("the matrix of its sensor".into(), |file| file.display().to_string());
         let of_codes = matrix.doubts_of_codes(&frame.metadata).into_iter();
         notes.extend(of_codes.map(|doubt| Note::Warning(format!("{}: {shown} {doubt}", frame.name))));
         notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
-        if let Some(file) = self.matrix.as_deref().filter(|_| matrix.is_relative()) {
+        if let Some(file) = self.matrix_file().filter(|_| matrix.is_relative()) {
             let text = format!("{}: XYZ are relative, Y = 1 for the white that saturates the camera", file.display());
             notes.push(Note::Remark(text));
         }
@@ -277,6 +286,19 @@ pub(super) fn doubt_of_white(white: White, is_relative: bool) -> Option<Note> {
             "the white has Y = {luminance}, but XYZ are relative: Y = 1 is the white by which the camera saturates"
         ))),
         _ => None,
+    }
+}
+
+/// The matrix of a frame's sensor, which is asked for.
+fn matrix_of_sensor(frame: &FrameHeader) -> Result<CameraMatrix> {
+    let sensor = frame.sensor()?;
+    match sensor.xyz_from_camera {
+        Some(xyz_from_camera) => Ok(CameraMatrix::of_sensor(sensor, xyz_from_camera)),
+        None => {
+            let problem =
+                format!("{}: its sensor, {}, has no matrix of its own; name a file of one", frame.name, sensor.name);
+            Err(Error::Usage(problem).change(&["matrix"]))
+        }
     }
 }
 

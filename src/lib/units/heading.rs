@@ -157,7 +157,37 @@ fn of_name_and_unit(heading: &str) -> Option<Stated> {
     });
     // `radiance_w_m2_sr_um`: powers that nobody tells from places.
     let in_name = || whole(OtherUnit::Unknown).filter(|_| names_unit_in_words(heading));
-    found.or_else(in_words).or_else(in_brackets).or_else(in_name)
+    let in_full = || whole(OtherUnit::Unknown).filter(|_| is_bare_unit(heading));
+    found.or_else(in_words).or_else(in_brackets).or_else(in_name).or_else(in_full)
+}
+
+/// Whether a heading without brackets is nothing but a unit: a word for levels or for light as the eye weights it, `dB`, or a word
+/// and what it is divided by, `cd/m2/nm`, `E m-2 s-1 nm-1`. One divisor may be a name's, `L/nm`.
+fn is_bare_unit(heading: &str) -> bool {
+    const LEVELS: [&str; 3] = ["db", "dbm", "flick"];
+    let tokens = tokens(heading);
+    let Some((Token::Factor { word, exponent: None }, rest)) = tokens.split_first() else { return false };
+    let word = word.to_lowercase();
+    let is_photometric = PHOTOMETRIC.contains(&word.as_str());
+    let (mut divisors, mut is_divided) = (0, false);
+    for token in rest {
+        match token {
+            Token::Per => is_divided = true,
+            Token::Square => {}
+            Token::Factor { word, exponent }
+                if base(word).is_some() && (is_divided || exponent.is_some_and(|power| power < 0)) =>
+            {
+                divisors += 1;
+            }
+            _ => return false,
+        }
+    }
+    match divisors {
+        // Two letters are a name.
+        0 => rest.is_empty() && (LEVELS.contains(&word.as_str()) || is_photometric && word.len() > 2),
+        1 => is_photometric,
+        _ => true,
+    }
 }
 
 /// Whether what stands beside a unit in a text of these pieces may be a factor.
@@ -531,7 +561,17 @@ mod tests {
 
     #[test]
     fn light_as_the_eye_weights_it_is_told() {
-        for text in ["L (cd m-2)", "L [cd/m2]", "L (lm/(m2 sr nm))", "radiance lm/(m2 sr nm)", "L [nit/nm]"] {
+        for text in [
+            "L (cd m-2)",
+            "L [cd/m2]",
+            "L (lm/(m2 sr nm))",
+            "radiance lm/(m2 sr nm)",
+            "L [nit/nm]",
+            "cd/m2/nm",
+            "cd m-2",
+            "cd per square m",
+            "lux",
+        ] {
             let found = unit_of_heading(text);
             assert!(matches!(found, Some(Stated::Other { kind: OtherUnit::Photometric, .. })), "{text}: {found:?}");
             assert_eq!(RadianceUnit::parse(text), None, "{text}");
@@ -587,6 +627,11 @@ mod tests {
             ("µmol/m2/s", Photons),
             ("quanta/s/cm2/sr/nm", Photons),
             ("photon_radiance", Photons),
+            ("uE m-2 s-1 nm-1", Photons),
+            ("µE/m²/s/nm", Photons),
+            ("E m-2 s-1 nm-1", Unknown),
+            ("dB", Unknown),
+            ("mmHg/m2/nm", Unknown),
             ("mW/(m^2 cm^-1)", PerFrequency),
             ("W m-2 sr-1 cm-1", PerCentimeter),
             ("W cm-2 sr-1 cm-1", PerCentimeter),
@@ -635,6 +680,13 @@ mod tests {
             "site-3 2026-11-24",
             "Lw-2b",
             "sky (90/45)",
+            "L/nm",
+            "L nm-1",
+            "UE",
+            "cd",
+            "sky m s",
+            "north/south",
+            "a/b/c",
         ] {
             assert_eq!(unit_of_heading(text), None, "{text}");
         }

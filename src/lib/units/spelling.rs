@@ -280,6 +280,8 @@ pub(super) fn base(word: &str) -> Option<Base> {
         "nw" | "nanowatt" => Base::Power(Power::Nanowatt),
         "ph" | "photon" | "quanta" | "quantum" | "mol" | "mmol" | "umol" | "nmol" | "mole" | "micromole"
         | "einstein" => Base::Photons,
+        // As `Ue`, it is a name.
+        "ue" if word == "uE" => Base::Photons,
         "j" | "joule" => Base::Energy(Power::Watt),
         "erg" => Base::Energy(Power::ErgPerSecond),
         "nm" | "nanometer" | "nanometre" => Base::Length(Length::Nanometer),

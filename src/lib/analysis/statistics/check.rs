@@ -214,6 +214,37 @@ impl Expected {
         self.site_sixths.iter().any(|sixth| *sixth != 0.0)
     }
 
+    /// Whether the sixth cumulant of photosites of a class makes up their fourth: it is that of what makes them unlike each other alone,
+    /// and where full well or single counts make the tails it is less than any law has, m₂ m₆ ≥ m₄² about the mean.
+    fn knows_tails(&self, class: usize) -> bool {
+        let (third, square) = (self.site_thirds[class], self.site_variances[class].powi(2));
+        let (second, fourth) = (self.site_variances[class], self.site_kurtosis[class] * square);
+        let sixth_moment =
+            self.site_sixths[class] + 15.0 * fourth * second + 10.0 * third * third + 15.0 * second * square;
+        self.has_tails() && sixth_moment * second >= (fourth + 3.0 * square).powi(2)
+    }
+
+    /// Whether so few photosites make up the variance of a channel that it is not like χ², in a way that nothing is known of.
+    fn is_heavy(&self, channel: usize) -> bool {
+        let classes = if self.is_plane { channel..channel + 1 } else { 0..3 };
+        let of_class = |class: usize| {
+            let kurtosis = self.site_kurtosis[class];
+            kurtosis > 1.0 && self.sampling.count < HEAVY * kurtosis && !self.knows_tails(class)
+        };
+        classes.into_iter().any(of_class)
+    }
+
+    /// Excess kurtosis of the sum of products of two channels whose photosites are independent, at most: ((κ + 3)(κ′ + 3) − 9)⁄n
+    /// with κ, κ′ those of photosites. None that matters where they hardly have any.
+    fn product_kurtosis(&self, channels: [usize; 2]) -> f64 {
+        let most = |channel: usize| {
+            let (classes, count) = self.classes_of(channel);
+            (classes.map(|class| self.site_kurtosis[class]).fold(0.0, f64::max), count)
+        };
+        let [(one, count), (other, _)] = channels.map(most);
+        if one.max(other) > 1.0 { ((one + 3.0) * (other + 3.0) - 9.0) / count } else { 0.0 }
+    }
+
     /// The classes that a channel is made of, and the least number of photosites of each.
     fn classes_of(&self, channel: usize) -> (std::ops::Range<usize>, f64) {
         if self.is_plane { (channel..channel + 1, self.sampling.count) } else { (0..3, self.sampling.count / 4.0) }
@@ -286,14 +317,12 @@ pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
     let sampling = &expected.sampling;
     let channels = measured.names.len();
     let least = expected.least_variance();
-    let heaviest = expected.site_kurtosis.iter().copied().fold(0.0, f64::max);
     let is_rare = |i: usize| {
-        let (variance, kurtosis) =
-            if expected.is_plane { (expected.site_variances[i], expected.site_kurtosis[i]) } else { (least, heaviest) };
+        let variance = if expected.is_plane { expected.site_variances[i] } else { least };
         let is_enough = sampling.count * variance >= RARE;
         // Where samples scatter by less than their rounding, neither mean nor variance follows a law that is known.
         let is_rounded = sampling.covariance[(i, i)].max(0.0).sqrt() <= expected.rounding(i);
-        !is_enough || is_rounded || (kurtosis > 1.0 && sampling.count < HEAVY * kurtosis && !expected.has_tails())
+        !is_enough || is_rounded || expected.is_heavy(i)
     };
     let mut found = Vec::new();
     for i in 0..channels {
@@ -308,9 +337,11 @@ pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
     }
     for (index, [i, j]) in PAIRS.into_iter().enumerate() {
         // Four pixels are the fewest whose correlation says anything.
-        let is_heavy = |i: usize| expected.has_tails() && expected.variance_kurtosis(i) > FREE;
-        if i != j && j < channels && ![i, j].into_iter().any(|i| is_rare(i) || is_heavy(i)) && sampling.count >= 4.0 {
-            found.extend(correlation(measured, sampling, index));
+        let is_free = |i: usize| expected.has_tails() && expected.variance_kurtosis(i) > FREE;
+        if i != j && j < channels && ![i, j].into_iter().any(|i| is_rare(i) || is_free(i)) && sampling.count >= 4.0 {
+            let kurtosis = expected.product_kurtosis([i, j]);
+            let test = correlation(measured, sampling, index);
+            found.extend(test.map(|test| if kurtosis > FREE { of_few_products(test, kurtosis) } else { test }));
         }
     }
     found
@@ -423,6 +454,16 @@ pub(super) fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: u
         degrees_of_freedom: Some(freedom),
         p: significance::of_normal(z),
     })
+}
+
+/// The same where few products of samples make up the covariance, as where two that are far off meet by chance: Markov's inequality
+/// of the second and the fourth power, P(|z| ≥ t) ≤ min(1/t², (3 + κ)/t⁴), of z = √ν (r − ρ)/(1 − ρ²), whose variance is 1.
+fn of_few_products(test: Test, kurtosis: f64) -> Test {
+    let (found, expected) = (test.measured, test.expected);
+    let freedom = test.degrees_of_freedom.unwrap_or_default();
+    let z = freedom.sqrt() * (found - expected) / (1.0 - expected * expected);
+    let bound = of_any_law(z).min((3.0 + kurtosis) / z.powi(4));
+    Test { z: Some(z), p: test.p.max(bound), ..test }
 }
 
 /// Where hardly a sample should deviate: P(mean square deviation ≥ d²) ≤ E d²/d² by Markov's inequality. What single

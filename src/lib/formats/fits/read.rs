@@ -9,6 +9,7 @@ use crate::formats::format::{
 };
 use crate::formats::read_ahead::Pipe;
 use crate::formats::register;
+use crate::formats::rounded::Rounded;
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::Metadata;
 use std::fs::File;
@@ -50,6 +51,8 @@ pub struct FitsReader {
     /// One row of one plane, as stored.
     stored: Vec<u8>,
     array: Array,
+    /// What is rounded off.
+    rounded: Rounded,
 }
 
 /// Where rows come from.
@@ -122,6 +125,7 @@ impl FitsReader {
                 next_row: 0,
                 stored: Vec::new(),
                 array,
+                rounded: Rounded::default(),
             });
         }
         let spooled = spool(&mut input, name)?;
@@ -142,7 +146,8 @@ impl FitsReader {
         } else {
             Source::Anywhere(file, data)
         };
-        Ok(Self { name: name.into(), source, form, geometry, told, next_row: 0, stored: Vec::new(), array })
+        let (stored, rounded) = (Vec::new(), Rounded::default());
+        Ok(Self { name: name.into(), source, form, geometry, told, next_row: 0, stored, array, rounded })
     }
 
     /// Brings one row of one plane, as stored.
@@ -309,7 +314,29 @@ impl Form {
         }
     }
 
+    /// The values of stored samples before they are rounded, where single precision may round them.
+    fn in_doubles(&self, stored: &[u8]) -> Vec<f64> {
+        fn numbers<const BYTES: usize>(stored: &[u8], number: impl Fn([u8; BYTES]) -> f64) -> Vec<f64> {
+            stored.as_chunks::<BYTES>().0.iter().map(|bytes| number(*bytes)).collect()
+        }
+        let mut found = match self.stored {
+            SampleType::U32 | SampleType::I32 => numbers(stored, |bytes| i32::from_be_bytes(bytes).into()),
+            SampleType::U64 => numbers(stored, |bytes| (u64::from_be_bytes(bytes) ^ SIGN_OF_64_BITS) as f64),
+            SampleType::I64 => numbers(stored, |bytes| i64::from_be_bytes(bytes) as f64),
+            _ => numbers(stored, f64::from_be_bytes),
+        };
+        for number in &mut found {
+            *number = if self.blank == Some(*number) { f64::NAN } else { self.value(*number) };
+        }
+        found
+    }
+
     /// value = BZERO + BSCALE · stored        \[FITS4, Eq. 3]
+    fn value(&self, number: f64) -> f64 {
+        if self.is_plain() { number } else { self.zero + self.scale * number }
+    }
+
+    /// Appends the values of stored samples by the number that each is.
     fn values<const BYTES: usize>(
         &self,
         stored: &[u8],
@@ -323,7 +350,7 @@ impl Form {
             if self.blank == Some(number) {
                 return f32::NAN;
             }
-            let value = if self.is_plain() { number } else { self.zero + self.scale * number };
+            let value = self.value(number);
             let sample = to_sample(value);
             overflows |= value.is_finite() && !sample.is_finite();
             sample
@@ -386,6 +413,10 @@ impl SampleReader for FitsReader {
                 self.form.append(&self.stored, samples).map_err(|Overflow| {
                     Error::format(&self.name, "it has samples beyond 3.4e38, the largest of single precision")
                 })?;
+                if channel == 0 && Rounded::looks_at(self.form.stored, row) {
+                    let values = self.form.in_doubles(&self.stored);
+                    self.rounded.take(self.form.stored, &values, &samples[start..], self.geometry.width);
+                }
                 if let Some(sample) = self.form.wrapped(&samples[start..]) {
                     let problem = format!(
                         "it has a sample of {sample}, as codes above 32767 have that were stored as 16 bits with sign (BITPIX = 16 without \
@@ -396,6 +427,9 @@ impl SampleReader for FitsReader {
             }
         }
         self.next_row += rows;
+        if self.next_row == self.geometry.height {
+            self.rounded.doubt(&self.name).into_iter().for_each(register::doubt);
+        }
         Ok(())
     }
 

@@ -8,6 +8,8 @@ use super::directory::{TiffFile, begins_so};
 use super::layout::Layout;
 use crate::error::Result;
 use crate::formats::format::{ColorTags, FrameFormat, Readers, Reading, Rest, SampleReader, SampleType, Sign};
+use crate::formats::register;
+use crate::formats::rounded::Rounded;
 use crate::frame::Geometry;
 use crate::metadata::{METADATA_BEGIN, Metadata};
 use half::f16;
@@ -59,6 +61,8 @@ pub struct TiffReader {
     /// The pieces that are decoded, in the order of [`TiffReader::piece_range`].
     decoded: Vec<u8>,
     held: Range<usize>,
+    /// What is rounded off.
+    rounded: Rounded,
 }
 
 impl TiffReader {
@@ -79,7 +83,8 @@ impl TiffReader {
         };
         let own_tags = capture::read(&mut file, &directory, &mut layout)?;
         let has_profile = directory.has(Tag::IccProfile);
-        Ok(Self { file, layout, own_tags, has_profile, next_row: 0, piece_rows, decoded: Vec::new(), held: 0..0 })
+        let (decoded, rounded) = (Vec::new(), Rounded::default());
+        Ok(Self { file, layout, own_tags, has_profile, next_row: 0, piece_rows, decoded, held: 0..0, rounded })
     }
 
     /// The texts in the image's tags.
@@ -122,6 +127,13 @@ impl TiffReader {
             if overflown.into_inner() {
                 return Err(self.file.problem("it has samples beyond 3.4e38, the largest of single precision"));
             }
+            let mut rounded = self.rounded;
+            for (row, samples) in (row..until).zip(now.chunks_exact(row_samples)) {
+                if let Some(values) = self.in_doubles(row, row_samples) {
+                    rounded.take(self.layout.stored, &values, samples, self.layout.geometry.width);
+                }
+            }
+            self.rounded = rounded;
             (row, rest) = (until, later);
         }
         Ok(())
@@ -278,8 +290,25 @@ impl TiffReader {
         }
     }
 
+    /// The samples of a row of the held pieces as they are stored, where single precision may round them and the row is looked at.
+    fn in_doubles(&self, row: usize, row_samples: usize) -> Option<Vec<f64>> {
+        let stored = self.layout.stored;
+        if !Rounded::looks_at(stored, row) {
+            return None;
+        }
+        let mut values = vec![0.0; row_samples];
+        match stored {
+            SampleType::U32 => self.convert(row, &mut values, |bytes| u32::from_ne_bytes(bytes).into()),
+            SampleType::I32 => self.convert(row, &mut values, |bytes| i32::from_ne_bytes(bytes).into()),
+            SampleType::U64 => self.convert(row, &mut values, |bytes| u64::from_ne_bytes(bytes) as f64),
+            SampleType::I64 => self.convert(row, &mut values, |bytes| i64::from_ne_bytes(bytes) as f64),
+            _ => self.convert(row, &mut values, f64::from_ne_bytes),
+        }
+        Some(values)
+    }
+
     /// Converts one row, sample by sample with `value`.
-    fn convert<const BYTES: usize>(&self, row: usize, samples: &mut [f32], value: impl Fn([u8; BYTES]) -> f32 + Copy) {
+    fn convert<T, const BYTES: usize>(&self, row: usize, samples: &mut [T], value: impl Fn([u8; BYTES]) -> T + Copy) {
         let layout = &self.layout;
         let piece = self.piece_of(row);
         let row_bytes = layout.chunk_row_bytes();
@@ -295,10 +324,10 @@ impl TiffReader {
                 let first = across * layout.chunk_width;
                 let columns = first..(first + layout.chunk_width).min(width);
                 match channels {
-                    1 => separate::<1, BYTES>(stored, samples, width, columns, value),
-                    2 => separate::<2, BYTES>(stored, samples, width, columns, value),
-                    3 => separate::<3, BYTES>(stored, samples, width, columns, value),
-                    4 => separate::<4, BYTES>(stored, samples, width, columns, value),
+                    1 => separate::<T, 1, BYTES>(stored, samples, width, columns, value),
+                    2 => separate::<T, 2, BYTES>(stored, samples, width, columns, value),
+                    3 => separate::<T, 3, BYTES>(stored, samples, width, columns, value),
+                    4 => separate::<T, 4, BYTES>(stored, samples, width, columns, value),
                     _ => {
                         let (stored, _) = stored.as_chunks::<BYTES>();
                         for channel in 0..channels {
@@ -361,6 +390,9 @@ impl SampleReader for TiffReader {
         samples.resize(start + rows * self.layout.geometry.row_samples(), 0.0);
         self.read_rows(self.next_row, rows, &mut samples[start..])?;
         self.next_row += rows;
+        if self.next_row == self.layout.geometry.height {
+            self.rounded.doubt(&self.file.name).into_iter().for_each(register::doubt);
+        }
         Ok(())
     }
 
@@ -377,12 +409,12 @@ struct Job<'a> {
 }
 
 /// Takes the interleaved channels of a chunk's row apart; with their number known, the compiler unrolls it.
-fn separate<const CHANNELS: usize, const BYTES: usize>(
+fn separate<T, const CHANNELS: usize, const BYTES: usize>(
     stored: &[u8],
-    samples: &mut [f32],
+    samples: &mut [T],
     width: usize,
     columns: Range<usize>,
-    value: impl Fn([u8; BYTES]) -> f32,
+    value: impl Fn([u8; BYTES]) -> T,
 ) {
     let (stored, _) = stored.as_chunks::<BYTES>();
     let (pixels, _) = stored.as_chunks::<CHANNELS>();

@@ -3,7 +3,6 @@
 use crate::metadata::PoissonKind;
 use crate::names::Named;
 use crate::random::Source;
-use crate::requests::notes::Note;
 use crate::requests::values;
 use crate::stages::noise::NoiseSettings;
 use crate::units::kelvin;
@@ -18,20 +17,25 @@ pub struct NoiseChoice {
     #[arg(long, value_delimiter = ',', value_name = "SOURCES", value_parser = values::choice::<Source>())]
     pub without: Vec<Source>,
     /// Temperature of the sensor in K; by default the sensor's own
-    #[arg(id = "temperature", long, value_name = "K", value_parser = values::kelvin)]
+    #[arg(id = "temperature", long, value_name = "K", value_parser = sensor_temperature)]
     pub temperature_k: Option<f64>,
 }
 
-impl NoiseChoice {
-    /// A warning of a temperature that looks like °C; next to none, which leaves out the dark signal, is meant.
-    pub fn doubt(&self) -> Option<Note> {
-        /// Temperatures, in K, that no silicon works at.
-        const COLD_K: std::ops::Range<f64> = 2.0..70.0;
-        let cold = self.temperature_k.filter(|kelvin| COLD_K.contains(kelvin))?;
-        let meant = kelvin(cold);
-        Some(Note::Warning(format!("a temperature of {cold} K looks like degrees Celsius, which is {meant} K")))
+/// Reads the temperature of a sensor in K, which sensor files have from 70 K on; next to none, which leaves out the dark signal, is meant.
+fn sensor_temperature(text: &str) -> Result<f64, String> {
+    /// Temperatures, in K, that no silicon works at.
+    const COLD_K: Range<f64> = 2.0..70.0;
+    let found = values::kelvin(text)?;
+    if COLD_K.contains(&found) {
+        let meant = kelvin(found);
+        return Err(format!(
+            "give a temperature in K, above 0; {found} looks like degrees Celsius, which is {meant} K"
+        ));
     }
+    Ok(found)
+}
 
+impl NoiseChoice {
     /// The noise of the seeds 0.
     pub fn settings(&self) -> NoiseSettings {
         NoiseSettings { without: self.without.clone(), temperature_k: self.temperature_k, ..NoiseSettings::default() }

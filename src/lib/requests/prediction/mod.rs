@@ -5,7 +5,7 @@ mod sweep;
 
 pub use sweep::Sweep;
 
-use super::conversion::doubt_of_white;
+use super::conversion::{OF_SENSOR, doubt_of_white};
 use super::described::either;
 use super::notes::Note;
 use super::options::{ExposureChoice, NoiseChoice, SignalLevel, SpectrumChoice, Subject, WhiteChoice, defaults};
@@ -32,9 +32,6 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use sweep::uncertainty;
-
-/// What stands for the matrix of the sensor in place of the name of a file.
-const OF_SENSOR: &str = "sensor";
 
 /// What is to be predicted, and how.
 #[derive(Debug, Clone, Args)]
@@ -215,7 +212,6 @@ impl NoisePrediction {
     /// Those of readers, sensor and matrix files and of the predictor; [`Error::Usage`] where the request makes no sense.
     pub fn run(&self) -> Result<PredictedNoise> {
         let mut found = if self.all_samples { self.of_library()? } else { self.of_scene()? };
-        found.notes.extend(self.noise.doubt());
         found.notes.extend(match &found.budgets {
             Budgets::Scene(scene) => doubts::of_cut(scene),
             // It goes through full well.
