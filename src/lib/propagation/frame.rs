@@ -271,7 +271,7 @@ fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> 
             return beyond(DRIFTING);
         }
         if sites.moments.iter().any(|site| site.lines != LineCovariance::default()) {
-            return beyond(taps::WITH_LINES);
+            return beyond(taps::with_lines(frame));
         }
         if sites.photosite.has_tails() && is_curved(metadata.quantity) {
             return beyond(tails::CURVED);

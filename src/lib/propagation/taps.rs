@@ -5,6 +5,7 @@
 
 use super::moments::{Equations, LineCovariance, Prediction};
 use super::unpredictable::{Predicted, Unpredictable};
+use crate::camera::taps::TapLayout;
 use crate::cfa::{CfaPattern, Class};
 use crate::frame::Geometry;
 use crate::metadata::FrameHeader;
@@ -23,8 +24,18 @@ pub(super) const FLATTENED: &str = "it was divided by a flat field of a sensor t
                          gains come off is not predicted";
 
 /// Why nothing is said of what rows and columns share.
-pub(super) const WITH_LINES: &str = "its rows or columns share noise, and several amplifiers (`taps` of the sensor) read them; regions and crops \
+const WITH_LINES: &str = "its rows or columns share noise, and several amplifiers (`taps` of the sensor) read them; regions and crops \
                           behind one of these are predicted";
+
+/// The same where no two columns beside each other are behind one amplifier.
+const LINES_BY_TURNS: &str = "its rows or columns share noise, and several amplifiers (`taps` of the sensor) read its columns by turns, of which \
+                              nothing is predicted but single columns before demosaicking";
+
+/// Why nothing is said of what rows and columns share on the sensor of a frame.
+pub(super) fn with_lines(frame: &FrameHeader) -> &'static str {
+    let is_by_turns = frame.taps().is_some_and(|taps| taps.layout == TapLayout::Columns);
+    if is_by_turns { LINES_BY_TURNS } else { WITH_LINES }
+}
 
 /// Photosites of a frame that one amplifier reads.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -169,7 +180,7 @@ pub(super) fn groups(
     if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
         return Err(Unpredictable::Beyond(FLATTENED));
     }
-    let parts = parts(frame);
+    let (parts, refused) = (parts(frame), with_lines(frame));
     if parts.len() < 2 {
         return Ok(None);
     }
@@ -177,7 +188,7 @@ pub(super) fn groups(
     for Part { counts, frame, .. } in parts {
         let sites = moments(&frame, equations)?;
         if sites.iter().any(|site| site.lines != LineCovariance::default()) {
-            return Err(Unpredictable::Beyond(WITH_LINES));
+            return Err(Unpredictable::Beyond(refused));
         }
         found.push(Group { counts, sites });
     }
