@@ -755,6 +755,9 @@ fn what_taps_and_drift_leave_open_is_refused() {
         assert!(told.contains("share noise") && told.contains("columns by turns") && !told.contains("crops"), "{told}");
     }
     assert!(regions_or(&codes, left(13)).is_err());
+    let turns = tapped([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[0]);
+    let told = why(&demosaicked(&plane_of(&digitized(&noisy(&turns, &settings(1)))), Method::SmoothHue));
+    assert!(told.contains("several amplifiers (`taps`") && !told.contains("behind one"), "{told}");
     let cte =
         AddNoise::new(&scene.header, &NoiseSettings { cte: Some(0.9999), ..settings(1) }).unwrap_err().to_string();
     assert!(cte.contains("several `taps`"), "{cte}");

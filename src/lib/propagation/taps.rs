@@ -19,6 +19,10 @@ use std::collections::BTreeMap;
 const MIXED: &str = "several amplifiers (`taps` of the sensor) have read it, and this is told of frames and crops behind one of them, \
                      with the reach of demosaicking";
 
+/// The same where they read columns by turns.
+const MIXED_BY_TURNS: &str = "several amplifiers (`taps` of the sensor) have read its columns by turns, and this is told of frames that one \
+                              alone has read";
+
 /// Why nothing is said of flat fields.
 pub(super) const FLATTENED: &str = "it was divided by a flat field of a sensor that is read through several amplifiers (`taps`), and how their \
                          gains come off is not predicted";
@@ -33,8 +37,12 @@ const LINES_BY_TURNS: &str = "its rows or columns share noise, and several ampli
 
 /// Why nothing is said of what rows and columns share on the sensor of a frame.
 pub(super) fn with_lines(frame: &FrameHeader) -> &'static str {
-    let is_by_turns = frame.taps().is_some_and(|taps| taps.layout == TapLayout::Columns);
-    if is_by_turns { LINES_BY_TURNS } else { WITH_LINES }
+    if are_by_turns(frame) { LINES_BY_TURNS } else { WITH_LINES }
+}
+
+/// Whether amplifiers read the columns of a frame by turns.
+pub(super) fn are_by_turns(frame: &FrameHeader) -> bool {
+    frame.taps().is_some_and(|taps| taps.layout == TapLayout::Columns)
 }
 
 /// Photosites of a frame that one amplifier reads.
@@ -159,7 +167,7 @@ pub(super) fn of_one(frame: &FrameHeader) -> Predicted<Cow<'_, FrameHeader>> {
     let geometry = frame.geometry.clone();
     match &mut parts(&with_footprint(frame))[..] {
         [one] => Ok(Cow::Owned(FrameHeader { geometry, ..one.frame.clone() })),
-        _ => Err(Unpredictable::Beyond(MIXED)),
+        _ => Err(Unpredictable::Beyond(if are_by_turns(frame) { MIXED_BY_TURNS } else { MIXED })),
     }
 }
 
