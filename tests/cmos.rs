@@ -5,6 +5,7 @@
 mod support;
 
 use cyanometer::analysis::statistics::{Laws, Region, RegionReport, Saturated, measure, measure_among};
+use cyanometer::camera::linearity::Linearization;
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::camera::taps::{TapLayout, Taps};
 use cyanometer::cfa::CfaPattern;
@@ -744,7 +745,19 @@ fn what_taps_and_drift_leave_open_is_refused() {
     with_readout(&mut lines, |readout| readout.row_noise_e = 3.0);
     let codes = digitized(&noisy(&lines, &settings(1)));
     assert!(why(&codes).contains("rows or columns share noise, and several amplifiers"));
+    assert!(why(&codes).ends_with("regions and crops behind one of these are predicted"), "{}", why(&codes));
     assert!(regions_or(&codes, left(13)).is_ok());
+    // Columns by turns: no region is behind one.
+    let mut turns = tapped([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[0]);
+    with_readout(&mut turns, |readout| readout.row_noise_e = 3.0);
+    let codes = digitized(&noisy(&turns, &settings(1)));
+    for told in [why(&codes), why(&demosaicked(&plane_of(&codes), Method::Bilinear))] {
+        assert!(told.contains("share noise") && told.contains("columns by turns") && !told.contains("crops"), "{told}");
+    }
+    assert!(regions_or(&codes, left(13)).is_err());
+    let turns = tapped([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[0]);
+    let told = why(&demosaicked(&plane_of(&digitized(&noisy(&turns, &settings(1)))), Method::SmoothHue));
+    assert!(told.contains("several amplifiers (`taps`") && !told.contains("behind one"), "{told}");
     let cte =
         AddNoise::new(&scene.header, &NoiseSettings { cte: Some(0.9999), ..settings(1) }).unwrap_err().to_string();
     assert!(cte.contains("several `taps`"), "{cte}");
@@ -754,6 +767,12 @@ fn what_taps_and_drift_leave_open_is_refused() {
     assert!(PixelNoise::of(&camera.header).unwrap_err().to_string().contains("`black_drift_e`"));
     let full = drifting([26, 22], [29_990.0, 2500.0, 1800.0], 9.0);
     assert!(why(&digitized(&noisy(&full, &settings(1)))).contains("black level drifts along rows, and full well"));
+    let mut bent = drift;
+    with_readout(&mut bent, |readout| {
+        readout.linearization = Some(Linearization::polynomial(vec![1.0, 1.2e-5]).unwrap());
+    });
+    let told = why(&digitized(&noisy(&bent, &settings(1))));
+    assert!(told.contains("black level drifts along rows, and the curve of the converter"), "{told}");
 }
 
 fn regions_or(frame: &MemoryFrame, region: Region) -> cyanometer::error::Result<()> {

@@ -208,14 +208,19 @@ impl Early {
     }
 }
 
-/// The first layout of rawtoaces: maker, model and step, a line each, then R, G and B from 380 to 780 nm.
+/// The first layout of rawtoaces: maker, model and step, a line each, then R, G and B from 380 to 780 nm, parted by commas, blanks or tabs.
 fn plain(bytes: &[u8]) -> Option<Found<Samples>> {
     let text = std::str::from_utf8(bytes).ok()?;
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     let is_word = |line: &&str| line.contains(|c: char| c.is_alphabetic()) && !line.contains([',', '\t', ';', '#']);
     let words = [lines.next().filter(is_word)?, lines.next()?];
-    let step: f64 = lines.next().filter(|line| line.bytes().all(|byte| byte.is_ascii_digit()))?.parse().ok()?;
-    let row = |line: &str| line.split(',').map(|cell| cell.trim().parse::<f64>().ok()).collect::<Option<Vec<f64>>>();
+    let step = lines.next().map(|line| line.strip_suffix("nm").unwrap_or(line).trim_end())?;
+    let step: f64 = Some(step).filter(|step| step.bytes().all(|byte| byte.is_ascii_digit()))?.parse().ok()?;
+    let number = |cell: &str| cell.trim().parse::<f64>().ok();
+    let row = |line: &str| -> Option<Vec<f64>> {
+        let has_commas = line.contains(',');
+        if has_commas { line.split(',').map(number).collect() } else { line.split_whitespace().map(number).collect() }
+    };
     let mut rows = Vec::new();
     for line in lines.take(MAX_SAMPLES) {
         match row(line) {
@@ -272,6 +277,9 @@ mod tests {
         let exchanged = read(&RAWTOACES.replace(r#"["R", "G", "B"]"#, r#"["b", "G", "R"]"#));
         assert_eq!(exchanged.values, [vec![3.0, 6.0], vec![2.0, 5.0], vec![1.0, 4.0]]);
         let plain = read("a\n5d\n200\n1, 2, 3\n4, 5, 6\n7, 8, 9\n");
+        for same in ["a\n5d\n200 nm\n1 2 3\n4  5 6\n7 8 9", "a\n5d\n200nm\n1\t2\t3\n4\t5\t6\n7 8\t9\n"] {
+            assert_eq!(read(same), plain, "{same}");
+        }
         assert_eq!(plain, Samples { about: "a 5d".into(), wavelength_nm: vec![380.0, 580.0, 780.0], ..wanted });
         // Tables are left to those who read them.
         for table in [
@@ -310,6 +318,7 @@ mod tests {
         assert!(dcamprof("[400, 420, 10]", "[400, 420]").contains("it has 2 bands, but 3, 3 and 3"));
         assert!(complaint("a\n5d\n5\n1,2,3\n").contains("380 to 780 nm by 5 nm, are not 1"));
         assert!(complaint("a\n5d\n400\n1,2,3\n1,2,x\n").contains("`1,2,x` is no row of R, G and B"));
+        assert!(complaint("a\n5d\n400\n0,1 0,2 0,3\n").contains("`0,1 0,2 0,3` is no row of R, G and B"));
         assert!(complaint("a\n5d\n400\n1,2\n1,2\n").contains("it has 2 channels"));
         let two = RAWTOACES.replace("\"main\": {", "\"infrared\": {}, \"main\": {");
         assert_eq!(read(&two).doubts, ["of its sets of samples `main` is read, infrared not"]);

@@ -249,6 +249,10 @@ const OF_ONE: &str = "the paper's sensor is read through one amplifier, and seve
 const BY_HUE: &str = "smooth hue transition divides by green, and several amplifiers (`taps` of the sensor) have a part in its pixels; of \
                       them bi, eci and mhc are predicted, and regions and crops behind one";
 
+/// The same where they read columns by turns.
+const BY_HUE_BY_TURNS: &str = "smooth hue transition divides by green, and several amplifiers (`taps` of the sensor) have a part in its \
+                               pixels; of them bi, eci and mhc are predicted";
+
 /// Pixels of a frame that several amplifiers have a part in.
 fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> {
     let metadata = &frame.metadata;
@@ -261,7 +265,7 @@ fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> 
         return beyond(taps::FLATTENED);
     }
     if Method::named(&record.method) == Some(Method::SmoothHue) {
-        return beyond(BY_HUE);
+        return beyond(if taps::are_by_turns(frame) { BY_HUE_BY_TURNS } else { BY_HUE });
     }
     let mut groups = Vec::new();
     for part in taps::parts(&taps::with_footprint(frame)) {
@@ -271,7 +275,7 @@ fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> 
             return beyond(DRIFTING);
         }
         if sites.moments.iter().any(|site| site.lines != LineCovariance::default()) {
-            return beyond(taps::WITH_LINES);
+            return beyond(taps::with_lines(frame));
         }
         if sites.photosite.has_tails() && is_curved(metadata.quantity) {
             return beyond(tails::CURVED);

@@ -66,6 +66,10 @@ const NORMALIZED: &str = "it was divided by a flat field whose rows or columns s
 const DRIFT_CUT: &str = "its black level drifts along rows, and full well, an end of the codes or a step of them cuts what rows share \
                          by that";
 
+/// Why nothing is said of a drift that the curve of a converter bends.
+const DRIFT_BENT: &str =
+    "its black level drifts along rows, and the curve of the converter (`linearization`) bends what rows share by that";
+
 /// Why nothing is said of pixels of a frame whose black level drifts.
 pub(super) const DRIFTING: &str = "its black level drifts along rows (`black_drift_e`), and what its pixels share by that is not \
                                    predicted; photosites are, before demosaicking";
@@ -294,7 +298,11 @@ impl Photosite {
         };
         match found {
             None if !self.has_tails() => Err(Unpredictable::Beyond(TOO_COARSE)),
-            Some(Regime::Curved) if self.drifts() && !self.has_tails() => Err(Unpredictable::Beyond(DRIFT_CUT)),
+            Some(Regime::Curved) if self.drifts() && !self.has_tails() => {
+                let is_reached = |adc: &AdcRecord| is_cut || laws.iter().any(|law| !law.is_within(adc));
+                let is_bent = self.adc.as_ref().is_some_and(|adc| adc.is_bent() && !is_reached(adc));
+                Err(Unpredictable::Beyond(if is_bent { DRIFT_BENT } else { DRIFT_CUT }))
+            }
             Some(regime) if regime == Regime::Straight || !self.has_tails() => Ok(regime),
             Some(Regime::Curved) if !is_cut && self.adc.as_ref().is_some_and(is_within) => {
                 Err(Unpredictable::Beyond(COARSE_LINES))

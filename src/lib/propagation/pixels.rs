@@ -385,7 +385,7 @@ fn pixel_taps(
     one: &Photosite,
 ) -> Result<PixelTaps> {
     if one.has_lines() {
-        return Err(frame.refuse(taps::WITH_LINES));
+        return Err(frame.refuse(taps::with_lines(frame)));
     }
     if one.flat.is_some() {
         return Err(frame.refuse(taps::FLATTENED));

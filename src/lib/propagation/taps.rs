@@ -5,6 +5,7 @@
 
 use super::moments::{Equations, LineCovariance, Prediction};
 use super::unpredictable::{Predicted, Unpredictable};
+use crate::camera::taps::TapLayout;
 use crate::cfa::{CfaPattern, Class};
 use crate::frame::Geometry;
 use crate::metadata::FrameHeader;
@@ -18,13 +19,31 @@ use std::collections::BTreeMap;
 const MIXED: &str = "several amplifiers (`taps` of the sensor) have read it, and this is told of frames and crops behind one of them, \
                      with the reach of demosaicking";
 
+/// The same where they read columns by turns.
+const MIXED_BY_TURNS: &str = "several amplifiers (`taps` of the sensor) have read its columns by turns, and this is told of frames that one \
+                              alone has read";
+
 /// Why nothing is said of flat fields.
 pub(super) const FLATTENED: &str = "it was divided by a flat field of a sensor that is read through several amplifiers (`taps`), and how their \
                          gains come off is not predicted";
 
 /// Why nothing is said of what rows and columns share.
-pub(super) const WITH_LINES: &str = "its rows or columns share noise, and several amplifiers (`taps` of the sensor) read them; regions and crops \
+const WITH_LINES: &str = "its rows or columns share noise, and several amplifiers (`taps` of the sensor) read them; regions and crops \
                           behind one of these are predicted";
+
+/// The same where no two columns beside each other are behind one amplifier.
+const LINES_BY_TURNS: &str = "its rows or columns share noise, and several amplifiers (`taps` of the sensor) read its columns by turns, of which \
+                              nothing is predicted but single columns before demosaicking";
+
+/// Why nothing is said of what rows and columns share on the sensor of a frame.
+pub(super) fn with_lines(frame: &FrameHeader) -> &'static str {
+    if are_by_turns(frame) { LINES_BY_TURNS } else { WITH_LINES }
+}
+
+/// Whether amplifiers read the columns of a frame by turns.
+pub(super) fn are_by_turns(frame: &FrameHeader) -> bool {
+    frame.taps().is_some_and(|taps| taps.layout == TapLayout::Columns)
+}
 
 /// Photosites of a frame that one amplifier reads.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -148,7 +167,7 @@ pub(super) fn of_one(frame: &FrameHeader) -> Predicted<Cow<'_, FrameHeader>> {
     let geometry = frame.geometry.clone();
     match &mut parts(&with_footprint(frame))[..] {
         [one] => Ok(Cow::Owned(FrameHeader { geometry, ..one.frame.clone() })),
-        _ => Err(Unpredictable::Beyond(MIXED)),
+        _ => Err(Unpredictable::Beyond(if are_by_turns(frame) { MIXED_BY_TURNS } else { MIXED })),
     }
 }
 
@@ -169,7 +188,7 @@ pub(super) fn groups(
     if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
         return Err(Unpredictable::Beyond(FLATTENED));
     }
-    let parts = parts(frame);
+    let (parts, refused) = (parts(frame), with_lines(frame));
     if parts.len() < 2 {
         return Ok(None);
     }
@@ -177,7 +196,7 @@ pub(super) fn groups(
     for Part { counts, frame, .. } in parts {
         let sites = moments(&frame, equations)?;
         if sites.iter().any(|site| site.lines != LineCovariance::default()) {
-            return Err(Unpredictable::Beyond(WITH_LINES));
+            return Err(Unpredictable::Beyond(refused));
         }
         found.push(Group { counts, sites });
     }

@@ -1,7 +1,8 @@
 //! Reports of measured cameras: as text, JSON, YAML and Markdown.
 
+use super::camera_defects::{defects_of, outstanding, patterns_of};
 use super::{form_of, in_digits, table, unwritable};
-use crate::analysis::photon_transfer::{ClassFindings, Finding, NAMED, OUTSTANDING, PatternView};
+use crate::analysis::photon_transfer::{ClassFindings, Finding, PatternView};
 use crate::error::Result;
 use crate::formats::places::named;
 use crate::formats::plots::{PlotFormat, write_plot};
@@ -10,7 +11,7 @@ use crate::names::Named;
 use crate::numerics::variance_components::Interval;
 use crate::requests::photon_transfer::{MeasuredCamera, frames_in_words};
 use crate::requests::values;
-use crate::text::{counted, visible};
+use crate::text::visible;
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -57,7 +58,7 @@ pub struct CameraOutputs {
     /// Form of the report; by default that of the ending of its file, or text
     #[arg(long, value_parser = values::choice::<CameraFormat>())]
     pub output_format: Option<CameraFormat>,
-    /// Draw photon transfer, response, linearity, signal to noise, and the patterns, as SVG or PNG
+    /// Draw photon transfer, response, linearity, signal to noise, and the patterns, as SVG or PNG; reports in JSON and YAML have the patterns' curves then
     #[arg(long, value_name = "FILE.svg|png")]
     pub plot: Option<PathBuf>,
     /// Write what was measured as a sensor file, for --sensor, by the name of the file, which says of each number whether it was measured, derived or assumed
@@ -136,7 +137,7 @@ fn document(camera: &MeasuredCamera) -> Value {
     })
 }
 
-fn channel(class: &ClassFindings, [light, dark]: &[Option<PatternView>; 2]) -> Value {
+fn channel(class: &ClassFindings, views: &[Option<PatternView>; 2]) -> Value {
     let mut all = Map::new();
     all.insert("name".into(), class.name.clone().into());
     let mut undetermined = Map::new();
@@ -155,20 +156,12 @@ fn channel(class: &ClassFindings, [light, dark]: &[Option<PatternView>; 2]) -> V
     all.insert("darks".into(), json!(class.darks));
     let deviations = class.linearity.as_ref().map(|linearity| &linearity.deviations);
     all.insert("linearity".into(), json!(deviations));
-    let named = &class.stuck[..class.stuck.len().min(NAMED)];
-    let stuck = json!({"count": class.stuck.len(), "sites": named});
-    let [light, dark] = [light, dark].map(|view| view.as_ref().map(defects));
-    let places: Vec<Value> = class.early.iter().take(NAMED).map(|[x, y]| json!({"x": x, "y": y})).collect();
-    let early = json!({"count": class.early.len(), "sites": places});
-    all.insert("defects".into(), json!({"light": light, "dark": dark, "stuck": stuck, "clipped": early}));
+    all.insert("defects".into(), defects_of(class, views));
+    if let Some(patterns) = patterns_of(views) {
+        all.insert("patterns".into(), patterns);
+    }
     all.insert("notes".into(), json!(class.notes));
     all.into()
-}
-
-/// Photosites that stand out from those around them.
-fn defects(view: &PatternView) -> Value {
-    let [count, expected] = view.outstanding;
-    json!({"beyond_std": OUTSTANDING, "std": view.spread, "count": count, "expected": expected, "worst": view.outliers})
 }
 
 /// An interval with the digits that its width leaves, in per cent where that is how it is read.
@@ -241,18 +234,6 @@ fn text(camera: &MeasuredCamera) -> String {
         }
     }
     out
-}
-
-/// How many photosites stand out, in words.
-fn outstanding(view: &PatternView, place: &str) -> String {
-    let [count, expected] = view.outstanding;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of photosites")]
-    let count = count as u64;
-    format!(
-        "{} stand out {place} by more than {OUTSTANDING} standard deviations of most; of a normal law {} would",
-        counted(count, "photosites"),
-        in_digits(expected, 2)
-    )
 }
 
 fn markdown(camera: &MeasuredCamera) -> String {

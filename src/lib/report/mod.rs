@@ -4,6 +4,7 @@ pub mod camera;
 pub mod characterization;
 pub mod chart;
 
+mod camera_defects;
 mod camera_page;
 mod camera_patterns;
 mod camera_sensor;

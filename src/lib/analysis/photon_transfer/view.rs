@@ -3,11 +3,15 @@
 //! A spectrogram is the mean power of the Fourier transforms of all rows, or columns, of the pattern less its mean: white noise of
 //! variance s² has power s² at every frequency \[EMVA1288, Sec. 8.3]. Profiles, histogram and defects are those of the pattern behind
 //! the standard's high-pass filter, which takes from each photosite the mean of the 5x5 around it, and with it what light and lens
-//! make uneven \[EMVA1288, Sec. 8.6]. Photosites count as the grid of their class does.
+//! make uneven \[EMVA1288, Sec. 8.6]. Histogram and defects have the two rows and columns at each edge too, where the standard looks at
+//! nothing: the level of these photosites is that of the plane through the 5x5 nearest to them, which in its middle is the mean. Photosites
+//! count as the grid of their class does.
 
 use super::level::Level;
 use super::sites::Site;
 use rustfft::{FftPlanner, num_complex::Complex};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
 /// Photosites on a side of the filter's box.
 const BOX: usize = 5;
@@ -73,7 +77,7 @@ pub struct PatternView {
     pub spread: f64,
     /// How many stand out, and how many of a normal law would.
     pub outstanding: [f64; 2],
-    /// Those that stand out most, the most first.
+    /// Those that stand out, the most first, [`NAMED`] of them at most.
     pub outliers: Vec<Outlier>,
     /// Variances that columns and rows add as the filter shows them, without what varies smoothly and photosites that stand out, and what
     /// they scatter by, standard deviations.
@@ -122,6 +126,10 @@ fn parts_of(filtered: &[Grid], noise: f64) -> ([[f64; 2]; 2], [f64; 2]) {
     let scatter = (2.0 / count).sqrt() * (square / LEFT[0]).hypot(noise * noise);
     (lines, [(square - in_lines) / LEFT[0] - noise * noise, scatter])
 }
+
+/// What rounding may have a photosite off by beside those around it, in what it has one of them off by at most: of one way it and the
+/// others the other. At a corner the plane takes these by weights the sizes of which add up to 1.8, 0.2 its own, and the rest counts 1.1 times.
+const APART: [f64; 2] = [2.0, 2.7];
 
 /// A grid of values.
 struct Grid {
@@ -188,15 +196,55 @@ impl Grid {
         Self { columns, rows, values }
     }
 
-    /// A value less the mean of the box around it, as far as there is one, without others that are told of.
-    fn above_others(&self, [x, y]: [usize; 2], told: &[bool]) -> f64 {
+    /// A value less what those around it tell of it, which are those of the box nearest to it that are not told of: their mean, or at the edge
+    /// their plane. At the edge noise is the same in it as behind the filter, as long as its own value counts among the others.
+    fn above_others(&self, place: [usize; 2], told: &[bool]) -> f64 {
+        let own = self.values[place[1] * self.columns + place[0]];
+        match self.around(place, told) {
+            Around { level, share } if self.is_at_edge(place) && share > 0.0 => {
+                (own - level) * (LEFT[0] / (1.0 - share)).sqrt()
+            }
+            Around { level, .. } => own - level,
+        }
+    }
+
+    /// What those of the box nearest to a place that are not told of tell of it.
+    fn around(&self, [x, y]: [usize; 2], told: &[bool]) -> Around {
         let margin = BOX / 2;
-        let reach = |at: usize, extent: usize| at.saturating_sub(margin)..=(at + margin).min(extent - 1);
-        let (columns, rows) = (reach(x, self.columns), reach(y, self.rows));
-        let around = rows.flat_map(|y| columns.clone().map(move |x| y * self.columns + x));
-        let others = around.filter(|at| !told[*at]);
-        let (sum, count) = others.fold((0.0, 0.0), |(sum, count), at| (sum + self.values[at], count + 1.0));
-        self.values[y * self.columns + x] - if count > 0.0 { sum / count } else { self.mean() }
+        let first = |at: usize, extent: usize| at.saturating_sub(margin).min(extent - BOX);
+        let [left, top] = [first(x, self.columns), first(y, self.rows)];
+        let places = (top..top + BOX).flat_map(|row| (left..left + BOX).map(move |column| [column, row]));
+        let untold = places.filter(|[column, row]| !told[row * self.columns + column]);
+        let others = untold.map(|[column, row]| {
+            let away = [column as f64 - x as f64, row as f64 - y as f64];
+            (away, self.values[row * self.columns + column])
+        });
+        let others: Vec<([f64; 2], f64)> = others.collect();
+        let count = others.len() as f64;
+        let mean = |of: &dyn Fn(&([f64; 2], f64)) -> f64| others.iter().map(of).sum::<f64>() / count;
+        if others.is_empty() {
+            return Around { level: self.mean(), share: 0.0 };
+        }
+        let level = mean(&|(_, value)| *value);
+        let is_own = if told[y * self.columns + x] { 0.0 } else { 1.0 };
+        let even = Around { level, share: is_own / count };
+        if !self.is_at_edge([x, y]) {
+            return even;
+        }
+        // About their middle the plane is their mean and two slopes, by least squares.
+        let [right, down] = [0, 1].map(|axis| mean(&|(away, _)| away[axis]));
+        let off = |away: &[f64; 2]| [away[0] - right, away[1] - down];
+        let product = |a: usize, b: usize| mean(&|(away, _)| off(away)[a] * off(away)[b]);
+        let with = |axis: usize| mean(&|(away, value)| off(away)[axis] * (value - level));
+        let (across, along, both) = (product(0, 0), product(1, 1), product(0, 1));
+        let determinant = across * along - both * both;
+        let weights = [along * right - both * down, across * down - both * right].map(|weight| weight / determinant);
+        let leverage = (1.0 + weights[0] * right + weights[1] * down) / count;
+        // Those that are left may lie on a line, or tell too little of a plane there.
+        if leverage.is_nan() || leverage >= 0.5 {
+            return even;
+        }
+        Around { level: level - weights[0] * with(0) - weights[1] * with(1), share: is_own * leverage }
     }
 
     /// Whether a place is so near the edge that there is no box around it.
@@ -205,23 +253,28 @@ impl Grid {
         x.min(y) < margin || x + margin >= self.columns || y + margin >= self.rows
     }
 
-    /// The same with means of those around in place of photosites that stand out, as `told` has those behind the filter: at the edge
-    /// those count too that are so far off.
-    fn mended(&self, told: &[bool], far: f64) -> Self {
-        let mut told = if told.is_empty() { vec![false; self.values.len()] } else { told.to_vec() };
+    /// Index and value less those around it of all at the edge.
+    fn at_edge(&self) -> Vec<(usize, f64)> {
+        let told = vec![false; self.values.len()];
+        let margin = BOX / 2;
+        let within = margin..self.columns - margin;
         let place = |at: usize| [at % self.columns, at / self.columns];
-        let at_edge = (0..self.values.len()).filter(|at| self.is_at_edge(place(*at)));
-        let above = at_edge.map(|at| (at, self.above_others(place(at), &told).abs()));
-        let mut off: Vec<(usize, f64)> = above.filter(|(_, above)| *above > far).collect();
-        off.sort_by(|a, b| b.1.total_cmp(&a.1));
-        for (at, _) in off {
-            told[at] = self.above_others(place(at), &told).abs() > far;
-        }
-        let values = self.values.iter().enumerate();
-        let stand_in = |(at, value): (usize, &f64)| {
-            if told[at] { value - self.above_others(place(at), &told) } else { *value }
+        let of_row = |y: usize| {
+            let is_whole = y < margin || y + margin >= self.rows;
+            let right = if is_whole { 0 } else { within.end };
+            let left = if is_whole { self.columns } else { within.start };
+            (0..left).chain(right.max(left)..self.columns).map(move |x| y * self.columns + x)
         };
-        Self { columns: self.columns, rows: self.rows, values: values.map(stand_in).collect() }
+        let all = (0..self.rows).flat_map(of_row);
+        all.map(|at| (at, self.above_others(place(at), &told))).collect()
+    }
+
+    /// The same with what those around tell in place of photosites that stand out.
+    fn mended(&self, told: &[bool]) -> Self {
+        let values = self.values.iter().enumerate().map(|(at, value)| {
+            if told[at] { self.around([at % self.columns, at / self.columns], told).level } else { *value }
+        });
+        Self { columns: self.columns, rows: self.rows, values: values.collect() }
     }
 
     /// Means of the columns, or of the rows.
@@ -236,6 +289,13 @@ impl Grid {
         }
         sums.iter().map(|sum| sum / self.rows as f64).collect()
     }
+}
+
+/// What those around a photosite tell of it.
+struct Around {
+    level: f64,
+    /// What of the photosite's own value is in that.
+    share: f64,
 }
 
 /// The pattern of a class whose grids are `sites` in a picture of so many columns and planes, of which `at` gives the value at an
@@ -264,16 +324,20 @@ pub fn pattern_view(
         all.sort_by(|a, b| a[0].total_cmp(&b[0]));
         all
     });
-    let mut values: Vec<f64> = filtered.iter().flat_map(|grid| grid.values.iter().copied()).collect();
+    let edges: Vec<Vec<(usize, f64)>> = grids.iter().map(Grid::at_edge).collect();
+    let at_edge = edges.iter().flatten().map(|(_, value)| *value);
+    let mut values: Vec<f64> = filtered.iter().flat_map(|grid| grid.values.iter().copied()).chain(at_edge).collect();
     let middle = median(&mut values);
     let mut absolute: Vec<f64> = values.iter().map(|value| (value - middle).abs()).collect();
     let least = if blur.hidden > 0.0 { LEFT[0].sqrt() * blur.noise } else { 0.0 };
     let spread = (median(&mut absolute) / NORMAL_MEDIAN).max(least);
-    let far = OUTSTANDING * spread + 2.0 * blur.hidden;
-    let (outstanding, outliers, told) = outliers(sites, [&grids, &filtered], middle, [spread, far]);
+    let far = APART.map(|apart| if spread > 0.0 { OUTSTANDING * spread + apart * blur.hidden } else { f64::INFINITY });
+    let (mut outliers, told) = outliers(sites, &grids, (&filtered, &edges), middle, far);
+    let expected = crate::numerics::significance::of_normal(OUTSTANDING) * values.len() as f64;
+    let outstanding = [outliers.len() as f64, expected];
+    outliers.truncate(NAMED);
     // A hot photosite would be a part of its column and of its row, and of all around it behind the filter.
-    let mended = |(grid, told): (&Grid, &Vec<bool>)| grid.mended(told, if spread > 0.0 { far } else { f64::INFINITY });
-    let mended: Vec<Grid> = grids.iter().zip(&told).map(|of| mended(of).high_passed()).collect();
+    let mended: Vec<Grid> = grids.iter().zip(&told).map(|(grid, told)| grid.mended(told).high_passed()).collect();
     let (lines, rest) = parts_of(&mended, blur.noise);
     let figure = draws.then(|| {
         let (histogram, normal) = histogram(&values, middle, spread);
@@ -283,39 +347,47 @@ pub fn pattern_view(
     Some(PatternView { profiles, figure, spread, outstanding, outliers, lines, rest })
 }
 
-/// How many photosites stand out, and how many of a normal law would; those that do most; and which of each grid, nothing of one of
-/// which none may. One that stands out is left out of the means around its neighbors, which would stand out to the other side by a 25th
-/// of it.
+/// Those that stand out, the most first, and which of each grid. One that stands out is left out of the means around its neighbors, which
+/// would stand out to the other side by a 25th of it, and more at the edge.
 fn outliers(
     sites: &[&Site],
-    [grids, filtered]: [&[Grid]; 2],
+    grids: &[Grid],
+    (filtered, edges): (&[Grid], &[Vec<(usize, f64)>]),
     middle: f64,
-    [spread, far]: [f64; 2],
-) -> ([f64; 2], Vec<Outlier>, Vec<Vec<bool>>) {
+    far: [f64; 2],
+) -> (Vec<Outlier>, Vec<Vec<bool>>) {
     let (mut outliers, mut all_told) = (Vec::new(), Vec::new());
-    let is_far = |value: f64| (value - middle).abs() > far && spread > 0.0;
-    for ((site, grid), filtered) in sites.iter().zip(grids).zip(filtered) {
-        let mut far: Vec<(usize, f64)> =
-            filtered.values.iter().copied().enumerate().filter(|(_, value)| is_far(*value)).collect();
-        far.sort_by(|a, b| (b.1 - middle).abs().total_cmp(&(a.1 - middle).abs()));
-        let mut told = vec![false; if far.is_empty() { 0 } else { grid.values.len() }];
-        for (index, _) in far {
-            let [x, y] = [index % filtered.columns + BOX / 2, index / filtered.columns + BOX / 2];
+    let off = |value: f64| (value - middle).abs();
+    for (index, (site, grid)) in sites.iter().zip(grids).enumerate() {
+        let (filtered, margin) = (&filtered[index], BOX / 2);
+        let of_grid = |at: usize| (at / filtered.columns + margin) * grid.columns + at % filtered.columns + margin;
+        let inner = filtered.values.iter().enumerate().filter(|(_, value)| off(**value) > far[0]);
+        let at_edge = edges[index].iter().filter(|(_, value)| off(*value) > far[1]);
+        let all = inner.map(|(at, value)| (of_grid(at), *value)).chain(at_edge.copied());
+        // Numbers that are not negative are in the order of their bits.
+        let mut all: BinaryHeap<(u64, Reverse<usize>)> =
+            all.map(|(at, value)| (off(value).to_bits(), Reverse(at))).collect();
+        let mut told = vec![false; grid.values.len()];
+        while let Some((_, Reverse(at))) = all.pop() {
+            let [x, y] = [at % grid.columns, at / grid.columns];
             let deviation = grid.above_others([x, y], &told);
-            if is_far(deviation) {
-                told[y * grid.columns + x] = true;
-                let place = |axis: usize, of: usize| site.first[axis] + of * site.step[axis];
-                outliers.push(Outlier { x: place(0, x), y: place(1, y), deviation });
+            if off(deviation) <= far[usize::from(grid.is_at_edge([x, y]))] {
+                continue;
             }
+            // Without those that have been told of it may be less far off than another.
+            let own = (off(deviation).to_bits(), Reverse(at));
+            if all.peek().is_some_and(|next| own.0 < next.0) {
+                all.push(own);
+                continue;
+            }
+            told[at] = true;
+            let place = |axis: usize, of: usize| site.first[axis] + of * site.step[axis];
+            outliers.push(Outlier { x: place(0, x), y: place(1, y), deviation });
         }
         all_told.push(told);
     }
-    let count: usize = filtered.iter().map(|grid| grid.values.len()).sum();
-    let expected = crate::numerics::significance::of_normal(OUTSTANDING) * count as f64;
-    let outstanding = [outliers.len() as f64, expected];
     outliers.sort_by(|a, b| b.deviation.abs().total_cmp(&a.deviation.abs()));
-    outliers.truncate(NAMED);
-    (outstanding, outliers, all_told)
+    (outliers, all_told)
 }
 
 /// Spectrograms along rows and along columns, the mean of those of the grids.
@@ -437,6 +509,38 @@ mod tests {
         let allowed = 5.0 * ((2.0 + 12.0 / 39.0) / f64::from(DRAWS)).sqrt() / 2.0;
         assert!((variance - 1.0).abs() < 5.0 * told / f64::from(DRAWS).sqrt(), "{variance}");
         assert!((scatter / told - 1.0).abs() < allowed && allowed < 0.07, "{scatter} {told}");
+    }
+
+    /// Of even noise on a slope of three standard deviations a photosite, which nothing stands out of, photosites in corners and at edges do, and
+    /// none of those around them: a hot one in a corner with a dim one near it, and a dim one in the last row. The law of those that stand out by
+    /// chance is of all photosites.
+    #[test]
+    fn what_stands_out_at_the_edge_is_found_there() {
+        const SIZE: [usize; 2] = [48, 32];
+        let site = Site { class: "Y".into(), plane: 0, first: [0, 0], step: [1, 1], size: SIZE };
+        let slope = |index: usize| {
+            let [word, ..] = philox4x32_10([u32::try_from(index).unwrap(), 0, 0, 0], [1, 5]);
+            f64::from(word) / 4_294_967_296.0 + 0.9 * (index % SIZE[0]) as f64 - 0.9 * (index / SIZE[0]) as f64
+        };
+        let viewed = |bad: &[([usize; 2], f64)]| {
+            let value = |index: usize| {
+                let [x, y] = [index % SIZE[0], index / SIZE[0]];
+                slope(index) + bad.iter().filter(|(place, _)| *place == [x, y]).map(|(_, off)| off).sum::<f64>()
+            };
+            let view = pattern_view(&[&site], [SIZE[0], 1], &value, Blur::default(), true).unwrap();
+            let places: Vec<[usize; 2]> = view.outliers.iter().map(|outlier| [outlier.x, outlier.y]).collect();
+            let drawn: f64 = view.figure.unwrap().histogram.iter().map(|[_, count]| count).sum();
+            (places, view.outstanding, drawn)
+        };
+        let all = (SIZE[0] * SIZE[1]) as f64;
+        let expected = crate::numerics::significance::of_normal(OUTSTANDING) * all;
+        assert_eq!(viewed(&[]), (vec![], [0.0, expected], all));
+        let bad = [([0, 0], 2000.0), ([20, 31], -300.0), ([2, 1], -100.0)];
+        assert_eq!(viewed(&bad), (bad.map(|(place, _)| place).to_vec(), [3.0, expected], all));
+        let column: Vec<([usize; 2], f64)> = (0..8).map(|y| ([47, y], 500.0)).collect();
+        let (mut places, ..) = viewed(&column);
+        places.sort_unstable();
+        assert_eq!(places, column.iter().map(|(place, _)| *place).collect::<Vec<_>>());
     }
 
     /// Of noise of variance 1/12 alone twelve photosites that stand out by thousands of spreads, one of them at the edge, make no rows and
