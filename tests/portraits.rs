@@ -234,9 +234,13 @@ fn saturated_samples_do_not_make_the_scale() {
 #[test]
 fn no_law_is_drawn_of_what_hot_photosites_make() {
     let shop = Workshop::new();
+    let template = shop.run("cyanometer template sensor", &[]);
+    std::fs::write(shop.path("sensor.yaml"), template).unwrap();
     let figure = |excess: &str, electrons: &str| {
-        let hot = format!("--set hot_pixel_share=0.001 --set hot_pixel_dark_current_e_per_s={excess}");
-        let render = format!("render-radiance --electrons {electrons} --size 64x48 {hot} -o expected.exr");
+        let sensor = std::fs::read_to_string(shop.path("sensor.yaml")).unwrap();
+        let hot = format!("readout:\n  hot_pixel_share: 0.001\n  hot_pixel_dark_current_e_per_s: {excess}\n");
+        std::fs::write(shop.path("hot.yaml"), sensor.replacen("readout:\n", &hot, 1)).unwrap();
+        let render = format!("render-radiance --electrons {electrons} --size 64x48 --sensor hot.yaml -o expected.exr");
         for line in [
             &render,
             "add-noise expected.exr --seed 3 -o noisy.exr",
