@@ -292,7 +292,7 @@ impl Evaluator<'_> {
         let stages = setup.stages(&plane)?;
         let white_luminance = match (settings.color.white_luminance, settings.color.white) {
             (None, White::Absolute(_)) => None,
-            (None, white) => saturating::luminance(self.sensor, stages.demosaic.header(), white)?,
+            (None, _) => saturating::luminance(self.sensor, stages.demosaic.header())?,
             (given, _) => given,
         };
         let made = |space| stages.to_xyz(&ColorSettings { space, white_luminance, ..settings.color.clone() });
