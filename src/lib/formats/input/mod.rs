@@ -53,8 +53,7 @@ use std::path::Path;
 /// # use cyanometer::frame::Geometry;
 /// # use cyanometer::metadata::{FrameHeader, Metadata};
 /// # use cyanometer::units::QuantityKind;
-/// # let metadata = Metadata::new(QuantityKind::Adu);
-/// # let geometry = Geometry::new(2, 2, &["Y"]);
+/// # let (metadata, geometry) = (Metadata::new(QuantityKind::Adu), Geometry::new(2, 2, &["Y"]));
 /// # let header = FrameHeader { name: "example".into(), geometry, metadata };
 ///
 /// let directory = tempfile::tempdir().unwrap();
