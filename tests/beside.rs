@@ -240,7 +240,7 @@ fn bias_frames_that_are_none_are_told() {
     ] {
         write(&shop, "bias.fits", [0.0, level], 3, &[("IMAGETYP", "'Bias Frame'")]);
         // That the bias is of no time is said of the camera, which tells none.
-        let said = shop.said(&format!("{line} {more}"), 0);
+        let said = shop.said(format!("{line} {more}").trim_end(), 0);
         assert_eq!([lit, long].map(|text| said.contains(text)), wanted, "{level} {more}: {said}");
     }
 }
@@ -280,7 +280,7 @@ fn dark_frames_that_flats_cannot_have_are_told() {
     for (level, is_told) in [(0.0, true), (500.0, false)] {
         signed("f.raw", level, 8);
         let said = shop.said(line, 0);
-        let text = "f.raw: 45 % of its samples are below zero";
+        let text = "% of its samples are below zero, as no camera writes them";
         assert_eq!(said.contains(text), is_told, "{level}: {said}");
     }
 }

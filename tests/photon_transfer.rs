@@ -529,7 +529,7 @@ fn clipped_darks_are_not_black() {
             Some((low.low..=low.high).contains(&truths["responsivity_adu_per_photon"]))
         })
         .collect();
-    check_misses("responsivity", held.into_iter());
+    check_misses("responsivity", held);
     let readout = ReadOut { full_well_e: 20_000.0, ..camera(3, Kind::Ccd) };
     let [flats, darks] = lit_by_time(&readout, 3);
     let clipped: Vec<Level> = darks.iter().map(|dark| Level { at_ends: [0.0, 0.3], ..dark.clone() }).collect();
@@ -571,7 +571,7 @@ fn a_black_level_that_drifts_is_no_dark_current() {
             Some((current.low..=current.high).contains(&readout.dark_current_e_per_s.unwrap()))
         })
         .collect();
-    check_misses("dark_current_e_per_s", held.into_iter());
+    check_misses("dark_current_e_per_s", held);
 }
 
 /// An uncertainty of all numbers of photons together is one of what they tell, however many levels there are.

@@ -91,6 +91,11 @@ pub fn about(value: f64, significant: u8) -> String {
     in_digits((value / unit).round() * unit, significant)
 }
 
+/// A time in ms beside what it is in s: 33.3 ms is 0.0333 s.
+pub fn ms_in_s(ms: f64) -> String {
+    format!("{ms} ms is {} s", in_decimals(ms / 1000.0, 12))
+}
+
 /// A number with so many decimals at most, none that say nothing: 4095, 0, -0.5.
 pub fn in_decimals(value: f64, most: usize) -> String {
     let shown = format!("{value:.most$}");

@@ -310,7 +310,7 @@ class DrawnCameras(unittest.TestCase):
             camera.rate[40, 50] = 450_000.0
             channel, said = camera.told(camera.frames(0.02, self.DARKS_S, stack=16))
             self.assertNotIn("too near saturation", str(channel["notes"]))
-            self.assertEqual(channel["defects"]["clipped"], {"count": 1, "sites": [{"x": 50, "y": 40}]})
+            self.assertEqual(channel["defects"]["clipped"], {"count": 1, "listed": 1, "sites": [{"x": 50, "y": 40}]})
             outside += self.outside(channel, {"prnu": Drawn.PRNU, "dark_current_e_per_s": 500.0})
         self.assertLessEqual(outside, 5)
 

@@ -1,6 +1,7 @@
 //! The lens: what of a radiance reaches the sensor, and where.
 
 use crate::error::{Error, Result};
+use crate::text::ms_in_s;
 use crate::units::MM_PER_UM;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -41,9 +42,7 @@ pub fn doubt_of_time(time_s: f64) -> Option<String> {
     match time_s {
         _ if !is_long(time_s) => None,
         _ if SHUTTERS.contains(&time_s) => Some(format!("{}; 1/{time_s} s is {} s", long(), 1.0 / time_s)),
-        _ if time_s > LONGEST_S || is_frame_time_in_ms(time_s) => {
-            Some(format!("{}; {time_s} ms is {} s", long(), time_s / 1000.0))
-        }
+        _ if time_s > LONGEST_S || is_frame_time_in_ms(time_s) => Some(format!("{}; {}", long(), ms_in_s(time_s))),
         _ => None,
     }
 }

@@ -81,11 +81,14 @@ impl Places {
         if spread <= OF_NONE * mean || is_read_out || !self.is_beyond_chance(ends) {
             return None;
         }
-        let fitting: Vec<[CfaPattern; 2]> = DIAGONALS
-            .into_iter()
-            .filter(|(greens, _)| self.unlike(*greens) <= ALIKE * spread)
-            .map(|(_, patterns)| patterns)
-            .collect();
+        // Greens are more alike than red and blue, where these are not alike by chance.
+        let least = DIAGONALS.map(|(places, _)| self.unlike(places)).into_iter().fold(f64::INFINITY, f64::min);
+        let is_fitting = |places: [usize; 2]| {
+            let unlike = self.unlike(places);
+            unlike <= ALIKE * spread && ALIKE * unlike <= least
+        };
+        let fitting: Vec<[CfaPattern; 2]> =
+            DIAGONALS.into_iter().filter(|(greens, _)| is_fitting(*greens)).map(|(_, patterns)| patterns).collect();
         let is_it = match fitting[..] {
             [[a, b]] => format!("is the array {a} or {b}?"),
             [] => "what filters are there?".to_owned(),

@@ -56,7 +56,7 @@ mod tests {
     #[test]
     fn equal_signals_stand_in_where_a_matrix_tells_no_white() {
         let white = White::EqualEnergy.xyz(1.0);
-        let without_green = Matrix3::new(1.0, 0.0, 0.0, 0.0, -2.0, 5.0, 0.0, 0.0, 1.0);
+        let without_green = Matrix3::new(1.0, 0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0, 1.0);
         for xyz_from_signals in [Matrix3::repeat(1.0), without_green] {
             let found = Saturation::of(&xyz_from_signals, [100.0; 3], white);
             assert_eq!(found, Saturation { luminance: 300.0, is_of_white: false });

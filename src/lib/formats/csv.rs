@@ -102,12 +102,9 @@ impl SpectralTable {
         }
         let heads = if has_header { heading_wavelengths(name, text, &first)? } else { None };
         let by_rows = heads.is_some();
-        let below = if has_header && !by_rows { record_below(name, text.rows(), &mut reader)? } else { None };
-        let (units, at_hand) = match below {
-            Some(record) if is_units(&first, &record) => (Some(record), None),
-            record => (None, record.or_else(|| (!has_header).then(|| first.clone()))),
-        };
         let above_columns = has_header && !by_rows;
+        let below = if above_columns { record_below(name, text.rows(), &mut reader)? } else { None };
+        let (units, at_hand) = units_of(&first, below, has_header);
         // Names, or times, before wavelengths are no numbers.
         let misplaced =
             |error| if above_columns { check_first_column(name, &first).err().unwrap_or(error) } else { error };
@@ -122,8 +119,7 @@ impl SpectralTable {
         }
         let Cells { numbers, labels, spoiled, points } = cells;
         misread::check_shape(name, &numbers, has_header)?;
-        let width = numbers.ncols();
-        let values = numbers.slice(ndarray::s![.., 1..]);
+        let (width, values) = (numbers.ncols(), numbers.slice(ndarray::s![.., 1..]));
         let named_in_comment = if has_header { None } else { spectral_heading::in_comment(&text.decoded, width) };
         let unit_of_heads = heads.as_ref().and_then(|heads| heads.unit);
         let of_heads = heads.as_ref().and_then(|heads| heads.quantity.clone());
@@ -374,6 +370,19 @@ fn first_record(name: &str, text: &Text, reader: &mut csv::Reader<&[u8]>) -> Res
         );
     }
     Ok(first)
+}
+
+/// The row of units `below` a heading, where it is one; else what of the table has been read: that row, or the `first` one where there is no
+/// heading.
+fn units_of(
+    first: &StringRecord,
+    below: Option<StringRecord>,
+    has_header: bool,
+) -> (Option<StringRecord>, Option<StringRecord>) {
+    match below {
+        Some(record) if is_units(first, &record) => (Some(record), None),
+        record => (None, record.or_else(|| (!has_header).then(|| first.clone()))),
+    }
 }
 
 /// The record below the header, if there is one.

@@ -271,6 +271,14 @@ fn add(sum: &mut Moments, weight: f64, moments: Moments) {
     }
 }
 
+/// What is read of normal laws so far beyond full well, or below it, that it is the same for all charges, less what is read at full well.
+fn of_even(nodes: &[Node], [full, direction, even]: [f64; 3], reading: &Reading, at_full: Moments) -> Moments {
+    let from = full + direction * even;
+    let beyond = |node: &Node| node.weight * cumulative(direction * (node.mean - from) / node.std);
+    let share: f64 = nodes.iter().map(beyond).sum();
+    difference(reading.at(from, 0.0), at_full).map(|moment| share * moment)
+}
+
 /// Takes off what is read of normal laws beyond full well (`direction` 1), or adds what is read below it of those whose mean lies
 /// beyond (−1), less what is read there of full photosites. `open` is the reading without a highest code where that is out of reach.
 fn add_beyond(
@@ -295,16 +303,11 @@ fn add_beyond(
         nodes.iter().for_each(|node| add(sum, sign * node.weight, straight.beyond(node, direction)));
         return;
     }
-    let farthest = match reading.even_from(full, direction).filter(|_| !has_floors) {
-        Some(distance) if distance < farthest => {
-            let from = full + direction * distance;
-            let beyond = |node: &Node| node.weight * cumulative(direction * (node.mean - from) / node.std);
-            let share: f64 = nodes.iter().map(beyond).sum();
-            add(sum, sign * share, difference(reading.at(from, 0.0), at_full));
-            distance
-        }
-        _ => farthest,
-    };
+    let even = reading.even_from(full, direction).filter(|even| *even < farthest && !has_floors);
+    if let Some(even) = even {
+        add(sum, sign, of_even(&nodes, [full, direction, even], reading, at_full));
+    }
+    let farthest = even.unwrap_or(farthest);
     let stds = nodes.iter().map(|node| node.std);
     let is_narrow = |std: &f64| *std < MANY * code;
     let widest = stds.clone().fold(0.0, f64::max);

@@ -96,7 +96,7 @@ pub fn excess([sum, squares]: [f64; 2], frames: usize, count: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::super::survey::survey;
-    use crate::frame::Geometry;
+    use crate::frame::{Geometry, to_sample};
     use crate::metadata::{FrameHeader, Metadata};
     use crate::random::philox::philox4x32_10;
     use crate::stream::MemoryFrame;
@@ -114,10 +114,8 @@ mod tests {
         let of = |frame: u32| {
             let geometry = Geometry::new(SIDE, SIDE, &["Y"]);
             let header = FrameHeader { name: "a".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
-            MemoryFrame::new(
-                header,
-                (0..SIDE * SIDE).map(|place| (200.0 + sample(place, frame)).round() as f32).collect(),
-            )
+            let code = |place: usize| to_sample((200.0 + sample(place, frame)).round());
+            MemoryFrame::new(header, (0..SIDE * SIDE).map(code).collect())
         };
         (0..count).map(of).collect()
     }
@@ -138,14 +136,14 @@ mod tests {
         assert_eq!(told(16, &turned), [2]);
         assert_eq!(told(4, &turned), [2]);
         let columns = |place: usize, frame: u32| {
-            let of_column = if place % 4 == 0 { 10.0 * normal(place % SIDE, frame, 3) } else { 0.0 };
+            let of_column = if place.is_multiple_of(4) { 10.0 * normal(place % SIDE, frame, 3) } else { 0.0 };
             pattern(place) + noise(place, frame) + of_column
         };
         let hit = |place: usize, frame: u32| {
             pattern(place) + noise(place, frame) + if [place, frame as usize] == [777, 3] { 60_000.0 } else { 0.0 }
         };
         let blinking = |place: usize, frame: u32| {
-            let is_bright = place / SIDE == 5 && place % 2 == 0 && frame != 1;
+            let is_bright = place / SIDE == 5 && place.is_multiple_of(2) && frame != 1;
             pattern(place) + noise(place, frame) + if is_bright { 3000.0 } else { 0.0 }
         };
         let alike: [&dyn Fn(usize, u32) -> f64; 4] = [&columns, &hit, &blinking, &noise];

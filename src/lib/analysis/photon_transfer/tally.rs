@@ -336,12 +336,9 @@ impl Tally {
         };
         let drifts: Vec<f64> = self.frame_sums.iter().map(|sum| sum / n).collect();
         let is_uneven = spatial_sum > f64::EPSILON * n * mean * mean;
-        let slopes: Vec<f64> = self
-            .products
-            .iter()
-            .zip(&drifts)
-            .map(|(product, drift)| if is_uneven { (product - above * n * drift) / spatial_sum } else { 0.0 })
-            .collect();
+        let slope =
+            |(product, drift): (&f64, &f64)| if is_uneven { (product - above * n * drift) / spatial_sum } else { 0.0 };
+        let slopes: Vec<f64> = self.products.iter().zip(&drifts).map(slope).collect();
         // What is left of rows and of columns once the drift is out.
         let left = |sum: f64, each: f64, frame: usize, of_mean: f64| {
             sum / each - drifts[frame] - slopes[frame] * (of_mean / each - above)

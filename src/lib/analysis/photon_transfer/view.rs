@@ -219,9 +219,9 @@ impl Grid {
             let away = [column as f64 - x as f64, row as f64 - y as f64];
             (away, self.values[row * self.columns + column])
         });
-        let others: Vec<([f64; 2], f64)> = others.collect();
+        let others: Vec<Away> = others.collect();
         let count = others.len() as f64;
-        let mean = |of: &dyn Fn(&([f64; 2], f64)) -> f64| others.iter().map(of).sum::<f64>() / count;
+        let mean = |of: &dyn Fn(&Away) -> f64| others.iter().map(of).sum::<f64>() / count;
         if others.is_empty() {
             return Around { level: self.mean(), share: 0.0 };
         }
@@ -347,12 +347,18 @@ pub fn pattern_view(
     Some(PatternView { profiles, figure, spread, outstanding, outliers, lines, rest })
 }
 
+/// Places of a grid that are near its edge, and how far they are off.
+type Edge = Vec<(usize, f64)>;
+
+/// Columns and rows from one place to another, and the value there.
+type Away = ([f64; 2], f64);
+
 /// Those that stand out, the most first, and which of each grid. One that stands out is left out of the means around its neighbors, which
 /// would stand out to the other side by a 25th of it, and more at the edge.
 fn outliers(
     sites: &[&Site],
     grids: &[Grid],
-    (filtered, edges): (&[Grid], &[Vec<(usize, f64)>]),
+    (filtered, edges): (&[Grid], &[Edge]),
     middle: f64,
     far: [f64; 2],
 ) -> (Vec<Outlier>, Vec<Vec<bool>>) {

@@ -4,7 +4,7 @@ use super::header::{Header, whole};
 use crate::cfa::FilterArray;
 use crate::formats::exposure::{self, ToldExposure};
 use crate::metadata::{CameraSettings, Metadata, TakenAs};
-use crate::text::{in_digits, visible};
+use crate::text::{in_digits, ms_in_s, visible};
 use crate::units::{QuantityKind, kelvin};
 use std::ops::RangeInclusive;
 
@@ -184,8 +184,8 @@ fn told_time(header: &Header, doubts: &mut Vec<String>) -> Option<f64> {
     doubts.extend(in_ms.map(|(key, time_s)| {
         let time_s = time_s.unwrap_or_default();
         format!(
-            "its {key} of {time_s} counts as s, as the standard has it, and its comment tells ms; {time_s} ms is {} s",
-            time_s / 1000.0
+            "its {key} of {time_s} counts as s, as the standard has it, and its comment tells ms; {}",
+            ms_in_s(time_s)
         )
     }));
     first_of("exposure time in s", &told, SAME_NUMBER, doubts)

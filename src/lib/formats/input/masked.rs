@@ -31,7 +31,7 @@ impl MaskedCheck {
     pub fn of(frame: &FrameHeader, black: BlackLevels) -> Option<Self> {
         let metadata = &frame.metadata;
         let are_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
-        let is_plane = frame.geometry.channels.first().is_some() && metadata.demosaic.is_none();
+        let is_plane = frame.geometry.channels.len() == 1 && metadata.demosaic.is_none();
         let is_open = are_codes && is_plane && metadata.correction.is_none() && !metadata.masked_areas.is_empty();
         is_open.then_some(Self { black, row: 0, rows: 0, above: Vec::new(), level: 0.0 })
     }

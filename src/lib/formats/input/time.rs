@@ -3,7 +3,7 @@
 use crate::camera::optics::is_frame_time_in_ms;
 use crate::formats::register;
 use crate::metadata::{FrameHeader, TakenAs};
-use crate::text::in_digits;
+use crate::text::{in_digits, ms_in_s};
 use crate::units::QuantityKind;
 
 /// Times from here on may be ms or the denominator of a shutter, s.
@@ -97,21 +97,19 @@ impl TimeCheck {
     /// Why the time cannot well be in s, once all rows were looked at.
     fn doubt(&self, frame: &FrameHeader) -> Option<String> {
         let time_s = self.time_s;
-        let (in_ms, of_shutter) = (time_s / 1000.0, in_digits(time_s.recip(), 3));
+        let (in_ms, of_shutter) = (ms_in_s(time_s), in_digits(time_s.recip(), 3));
         if let Some([bias, least]) = self.dark
             && self.darkest - bias < least - NEAR[0].max(NEAR[1] * bias.abs())
         {
             return Some(format!(
                 "in its exposure of {time_s} s its sensor has a dark signal of {least:.0} ADU at least, and the darkest part of the frame is \
-                 {:.0} ADU above the bias; {time_s} ms is {in_ms} s, and 1/{time_s} s is {of_shutter} s, unless the camera takes dark signal \
+                 {:.0} ADU above the bias; {in_ms}, and 1/{time_s} s is {of_shutter} s, unless the camera takes dark signal \
                  off itself",
                 self.darkest - bias
             ));
         }
         (self.looks_like_ms && self.is_bright(frame)).then(|| {
-            format!(
-                "an exposure of {time_s} s by its own tags is long for a frame that is as bright; {time_s} ms is {in_ms} s"
-            )
+            format!("an exposure of {time_s} s by its own tags is long for a frame that is as bright; {in_ms}")
         })
     }
 

@@ -436,7 +436,7 @@ mod tests {
     /// named, though one photosite is at the largest code in all frames; what is said rightly is not doubted, nor a flat of little light.
     #[test]
     fn an_array_that_does_not_fit_is_named() {
-        const SIDE: usize = 32;
+        const SIDE: usize = 128;
         let groups = [group(false), group(true), group(true)];
         let doubt = |array: &str, scale: f32| {
             let of = |light: f32| {

@@ -19,7 +19,7 @@ use crate::frame::Geometry;
 use crate::requests::notes::{self, Note};
 use crate::spectrum::{SpectralLibrary, chart_columns};
 use crate::stream::RowSource;
-use crate::text::in_digits;
+use crate::text::{in_digits, ms_in_s};
 use std::path::Path;
 
 /// Error of a sum over wavelengths from which it is a warning.
@@ -239,7 +239,7 @@ fn overfull(light: &Light, readout: Option<&ReadOut>, expose_to: Option<f64>, ex
     };
     let is_of_night = source != "--electrons" && expose_to.is_none() && is_long(exposure_s);
     let unit = if is_of_night {
-        format!("; the exposure is {exposure_s} s, and {exposure_s} ms is {} s", exposure_s / 1000.0)
+        format!("; the exposure is {exposure_s} s, and {}", ms_in_s(exposure_s))
     } else {
         String::new()
     };
