@@ -136,8 +136,14 @@ fn flats_behind_another_pattern_are_told() {
     write_fits(&shop, "light.fits", SIZE, &[], lit([4000.0, 6000.0, 3000.0], 1));
     write_fits(&shop, "flat.fits", SIZE, &[], lit([5500.0, 7000.0, 5000.0], 2));
     let doubts = |pattern: &str| {
-        let line = "correct-frame light.fits --black 500 --white 16000 --flat flat.fits -o out.exr --cfa ";
-        shop.said(&format!("{line}{pattern}"), 0)
+        for name in ["light.fits", "flat.fits"] {
+            let mut bytes = fs::read(shop.path(name)).unwrap();
+            let card = b"BAYERPAT= '";
+            let at = bytes.windows(card.len()).position(|window| window == card).unwrap() + card.len();
+            bytes[at..at + 4].copy_from_slice(pattern.to_uppercase().as_bytes());
+            fs::write(shop.path(name), bytes).unwrap();
+        }
+        shop.said("correct-frame light.fits --black 500 --white 16000 --flat flat.fits -o out.exr", 0)
     };
     let said = doubts("grbg");
     assert!(

@@ -11,6 +11,7 @@ pub mod normal;
 pub mod planes;
 pub mod quadrature;
 pub mod quantiles;
+pub mod robust;
 pub mod rounding;
 pub mod running;
 pub mod significance;

@@ -64,12 +64,7 @@ fn demosaic(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let mut stage = Demosaic::new(reader.header(), arguments.method, arguments.black, None)?;
     session.tell(described::doubt_of_black(reader.header(), arguments.black)?.as_slice());
-    if let Black::Level(level) = arguments.black {
-        reader.expect_black(level);
-    }
-    if arguments.black != Black::None {
-        reader.compare_masked(arguments.black.levels(reader.header())?);
-    }
+    described::hold_black(&mut reader, arguments.black)?;
     session.sign(stage.header_mut());
     session.tell(requests::of_levels(stage.header()).as_slice());
     session.tell(requests::of_bent_codes(reader.header()).as_slice());

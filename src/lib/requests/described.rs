@@ -11,6 +11,7 @@ use crate::formats::input::{FrameReader, InputOptions, OfCamera};
 use crate::formats::register;
 use crate::metadata::{CorrectionRecord, FrameHeader};
 use crate::stages::black::Black;
+use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use clap::Args;
 use std::fmt::Display;
@@ -252,6 +253,21 @@ pub fn either<T: PartialEq + Copy + Display>(cfa: Option<T>, pattern: Option<T>)
 
 /// What no code of a camera is above: of converters of more than 16 bits the white level is to be told.
 const LARGEST_CODE: f64 = 65_535.0;
+
+/// Has a black level that comes off a frame held against its samples, and against masked photosites of it.
+///
+/// # Errors
+///
+/// Those of [`Black::levels`].
+pub fn hold_black(reader: &mut FrameReader, black: Black) -> Result<()> {
+    if let Black::Level(level) = black {
+        reader.expect_black(level);
+    }
+    if black != Black::None {
+        reader.compare_masked(black.levels(reader.header())?);
+    }
+    Ok(())
+}
 
 /// A warning of a level to subtract that is not what the metadata say of no light, or far from the bias of the sensor that is named.
 ///

@@ -7,7 +7,8 @@
 use super::curve::{are_whole, is_clipped};
 use super::level::Level;
 use super::sites::Site;
-use super::view::{Blur, NORMAL_MEDIAN, OUTSTANDING, median};
+use super::view::{Blur, OUTSTANDING};
+use crate::numerics::robust::{NORMAL_MEDIAN, median};
 
 /// Hot photosites of a class.
 #[derive(Debug, Clone, Copy, PartialEq)]

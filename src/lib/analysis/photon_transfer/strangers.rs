@@ -8,7 +8,7 @@
 //! of that share of the variance of ȳ which is pattern, not noise. The median over the rows leaves alone what few photosites do: hot ones that
 //! blink, and rays that hit one frame.
 
-use super::view::median;
+use crate::numerics::robust::median;
 use crate::numerics::variance_components::MeanSquares;
 
 /// Fewer frames do not tell which of them is another.

@@ -6,6 +6,7 @@
 //! that what light adds, the difference of the two, is too small, or none at all.
 
 use super::sites::Site;
+use crate::numerics::robust::median;
 
 /// A photosite that is stuck.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -216,8 +217,7 @@ fn middle(site: &Site, of: impl Fn(usize, usize) -> f64) -> f64 {
     // An odd step takes all columns.
     let step = (site.count() / ENOUGH) | 1;
     let mut values: Vec<f64> = (0..site.count()).step_by(step).map(|at| of(at / columns, at % columns)).collect();
-    let half = values.len() / 2;
-    *values.select_nth_unstable_by(half, f64::total_cmp).1
+    median(&mut values)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::fit::{Line, Point, variance_besides};
 use super::level::Level;
 use super::scatter::Scatter;
 use crate::numerics::quantiles::of_student;
+use crate::numerics::robust::{NORMAL_MEDIAN, median};
 use crate::numerics::significance;
 
 /// So many standard deviations off the others is plainly off.
@@ -141,8 +142,6 @@ fn above_a_flat<'a>(dark: &Level, flats: impl Iterator<Item = &'a Level>, scatte
 fn off_response(curve: &Curve, flats: &[Level], scatter: &Scatter) -> Vec<Suspect> {
     /// By so large a share, and one of the largest signal, is worth a word.
     const SHARES: [f64; 2] = [0.1, 0.005];
-    /// The median of absolute deviations of a normal law, in standard deviations.
-    const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
     let is_by_photons = flats.iter().all(|flat| flat.condition.photons.is_some());
     let light = |flat: &Level| if is_by_photons { flat.condition.photons } else { flat.condition.exposure_s };
     let known: Vec<(usize, f64)> = below_saturation(flats)
@@ -154,8 +153,9 @@ fn off_response(curve: &Curve, flats: &[Level], scatter: &Scatter) -> Vec<Suspec
     if ratios.len() <= OTHERS {
         return Vec::new();
     }
-    let middle = median(ratios.clone());
-    let spread = median(ratios.iter().map(|ratio| (ratio / middle - 1.0).abs()).collect()) / NORMAL_MEDIAN;
+    let middle = median(&mut ratios.clone());
+    let mut off: Vec<f64> = ratios.iter().map(|ratio| (ratio / middle - 1.0).abs()).collect();
+    let spread = median(&mut off) / NORMAL_MEDIAN;
     let largest = known.iter().map(|(flat, _)| curve.signal(*flat)).fold(0.0, f64::max);
     let off = |&(flat, light): &(usize, f64)| {
         let (signal, wanted) = (curve.signal(flat), middle * light);
@@ -230,9 +230,4 @@ fn farthest_off(curve: &Curve, flats: &[Level], known: &[(usize, f64)], is_by_ph
         (0..known.len()).filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(far, ..)| *far > 1.0)?;
     let flat = known[place].0;
     Some(unlike(&flats[flat], [curve.signal(flat), wanted], is_by_photons))
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

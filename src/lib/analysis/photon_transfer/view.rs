@@ -9,6 +9,7 @@
 
 use super::level::Level;
 use super::sites::Site;
+use crate::numerics::robust::{NORMAL_MEDIAN, median};
 use rustfft::{FftPlanner, num_complex::Complex};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -21,8 +22,6 @@ const BINS: usize = 256;
 pub const OUTSTANDING: f64 = 5.0;
 /// So many of those that stand out most are named.
 pub const NAMED: usize = 100;
-/// The median of absolute deviations of a normal law, in standard deviations.
-pub(super) const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
 /// What the mean of frames leaves uncertain of a photosite, in the unit of its pattern.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -432,12 +431,6 @@ fn mean_of(spectra: Vec<Vec<[f64; 2]>>) -> Vec<[f64; 2]> {
     let shortest = spectra.iter().map(Vec::len).min().unwrap_or(0);
     let power = |index: usize| spectra.iter().map(|spectrum| spectrum[index][1]).sum::<f64>() / count;
     (0..shortest).map(|index| [spectra[0][index][0], power(index)]).collect()
-}
-
-/// The median of numbers, which it puts into another order; of an even count the upper one.
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Photosites in each bin, and what a normal law has there.
