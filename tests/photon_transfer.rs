@@ -524,7 +524,8 @@ fn clipped_darks_are_not_black() {
                 assert!(why(&low, key).contains("clipped at code 0"), "{index}: {key}");
             }
             let [own, low] = [own, low].map(|found| found.get("responsivity_adu_per_photon").unwrap());
-            assert!((own.value / low.value - 1.0).abs() < 1e-9, "{index}: {own:?} {low:?}");
+            // Weights of the levels know the signal, and so differ a little.
+            assert!((own.value - low.value).abs() < 1e-2 * (low.high - low.low), "{index}: {own:?} {low:?}");
             let truths: BTreeMap<&str, f64> = truths(&readout, index).into_iter().collect();
             Some((low.low..=low.high).contains(&truths["responsivity_adu_per_photon"]))
         })

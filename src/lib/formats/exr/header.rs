@@ -1,6 +1,6 @@
 //! What the headers of an EXR file say about its parts, or why a part cannot be read.
 
-use super::{ExrTags, METADATA_ATTRIBUTE, Primaries, XYZ_PRIMARIES, attributes};
+use super::{ExrTags, METADATA_ATTRIBUTE, Primaries, UNITS_ATTRIBUTE, XYZ_PRIMARIES, attributes};
 use crate::camera::optics::Exposure;
 use crate::error::{Error, Result};
 use crate::formats::foreign::{self, STORE_WITHOUT_LOSS, SUBSAMPLED};
@@ -190,7 +190,7 @@ fn read_tags(header: &Header) -> ExrTags {
             .shared_attributes
             .chromaticities
             .map(|c| [point(c.red), point(c.green), point(c.blue), point(c.white)]),
-        emissive_units: other("emissiveUnits"),
+        emissive_units: other(UNITS_ATTRIBUTE),
         spectral_layout: other("spectralLayoutVersion"),
     }
 }

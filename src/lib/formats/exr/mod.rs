@@ -22,6 +22,8 @@ pub use write::{ExrWriter, TablePatch, patch_table};
 
 /// The string attribute that holds the metadata.
 const METADATA_ATTRIBUTE: &str = "cyanometer";
+/// The unit of a spectral image \[Fichet2021].
+const UNITS_ATTRIBUTE: &str = "emissiveUnits";
 /// The attribute that names the color space.
 const INTEROP_ATTRIBUTE: &str = "colorInteropID";
 /// What it says of channels that are no colors \[CIF2025].

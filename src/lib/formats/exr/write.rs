@@ -4,7 +4,7 @@ use super::straight::encode;
 use super::write_behind::WriteBehind;
 use super::{
     DATA, ExrCompression, ExrSamples, ExrTags, INTEROP_ATTRIBUTE, Layers, METADATA_ATTRIBUTE, PARALLEL_BLOCK_BYTES,
-    PART_NAMES, is_layer,
+    PART_NAMES, UNITS_ATTRIBUTE, is_layer,
 };
 use crate::error::{Error, Result};
 use crate::frame::{Geometry, to_sample};
@@ -365,6 +365,9 @@ fn attributes(tags: &ExrTags, origin: Vec2<i32>, size: Vec2<usize>) -> (LayerAtt
     // The crate keeps other attributes in hash maps; one entry alone in each has the same order in every run.
     if let Some(metadata) = &tags.metadata {
         own.other.insert(Text::new_or_panic(METADATA_ATTRIBUTE), AttributeValue::Text(text(metadata)));
+    }
+    if let Some(unit) = &tags.emissive_units {
+        own.other.insert(Text::new_or_panic(UNITS_ATTRIBUTE), AttributeValue::Text(text(unit)));
     }
     let mut shared = ImageAttributes::new(IntegerBounds::new(origin, size));
     if let Some(name) = &tags.interop_id {
