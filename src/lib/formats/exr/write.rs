@@ -366,7 +366,7 @@ fn attributes(tags: &ExrTags, origin: Vec2<i32>, size: Vec2<usize>) -> (LayerAtt
     if let Some(metadata) = &tags.metadata {
         own.other.insert(Text::new_or_panic(METADATA_ATTRIBUTE), AttributeValue::Text(text(metadata)));
     }
-    if let Some(unit) = &tags.emissive_units {
+    if let (Some(unit), None) = (&tags.emissive_units, &tags.metadata) {
         own.other.insert(Text::new_or_panic(UNITS_ATTRIBUTE), AttributeValue::Text(text(unit)));
     }
     let mut shared = ImageAttributes::new(IntegerBounds::new(origin, size));
