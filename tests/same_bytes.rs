@@ -29,7 +29,7 @@ const KNOWN: [(&str, &str); 26] = [
     ("demosaic codes.exr --method shti -o shti.exr", "blake3:abfb343751d6b305"),
     ("demosaic codes.exr --method mhc -o mhc.exr", "blake3:17101b09391fabfd"),
     ("demosaic codes.exr --method eci -o eci.exr", "blake3:392fe55602668f70"),
-    ("to-xyz eci.exr --matrix matrix.yaml --space lab -o lab.exr", "blake3:30a72eebc15f8299"),
+    ("to-xyz eci.exr --matrix matrix.yaml --space lab -o lab.exr", "blake3:5736554b3633d736"),
     ("to-xyz eci.exr --matrix matrix.yaml --space xyz -o xyz.exr", "blake3:4edb1798ad2e123c"),
     ("to-xyz eci.exr --matrix matrix.yaml --space xyy -o xyy.exr", "blake3:2d594a68f3ab0589"),
     ("digitize noisy.exr --compression deflate -o codes.tiff", "blake3:3116139da09d2b7f"),

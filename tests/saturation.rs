@@ -299,8 +299,8 @@ fn a_clipped_blue_is_known_to_the_end() {
 #[test]
 fn averages_tell_of_saturation_in_every_format() {
     let shop = Workshop::new();
-    shop.run("render-radiance --electrons 15000,25000,60000 --size 20x10 -o e.exr", &[]);
-    shop.run("add-noise e.exr --frames 0..3 -o n{frame}.exr", &[]);
+    shop.run("render-radiance --electrons 15000,25000,60000 --size 20x10 --quiet -o e.exr", &[]);
+    shop.run("add-noise e.exr --quiet --frames 0..3 -o n{frame}.exr", &[]);
     for name in ["mean.exr", "mean.tiff"] {
         let output = shop.attempt(&format!("average-frames n0.exr n1.exr n2.exr -o {name}"), &[]);
         let text = String::from_utf8_lossy(&output.stderr).into_owned();

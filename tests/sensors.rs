@@ -183,7 +183,7 @@ fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
         ),
         (&FLAT.to_owned(), "sensor/1", "sensor/2", "unknown key `width`; did you mean `readout.width`?"),
         (&FLAT.to_owned(), "cfa: gbrg", "cfa: monochrome", "`cfa` is `monochrome`; known are"),
-        (&parts, "cfa: gbrg", "cfa: rgbw", "readout.cfa: `rgbw` is no filter array; one is rggb"),
+        (&parts, "cfa: gbrg", "cfa: rgbw", "in `readout.cfa`, `rgbw` is no filter array; one is rggb"),
         (&parts, "bits: 14", "bits: 0", "`bits` is 0; it must be 1 to 16"),
         (&parts, "width: 12", "width: wide", "`readout.width` is `wide`, not a whole number from 0 on"),
     ] {

@@ -398,7 +398,7 @@ fn dark_frames_of_less_than_a_code_are_predicted() {
             let coarse = |readout: &mut ReadOut| {
                 tailed(readout);
                 (readout.adu_per_e, readout.read_noise_e, readout.bits) = (gain, noise_e, 12);
-                (readout.hot_pixel_dark_current_e_per_s, readout.rts_amplitude_e) = (hot, 2.0);
+                (readout.hot_pixel_dark_current_e_per_s, readout.rts_share, readout.rts_amplitude_e) = (hot, 0.0, 0.0);
             };
             let scene = scene([260, 240], [3.0, 12.0, 7.0], coarse);
             let plane = plane_of(&digitized(&noisy(&scene, &settings(seed))));
