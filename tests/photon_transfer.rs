@@ -506,7 +506,7 @@ fn clipped_darks_do_not_change_the_gain() {
 }
 
 /// Where all darks are clipped, black is not their mean. Of flats of one exposure time, whose black may lie far below that, the responsivity is
-/// the same, and in its interval as often as is stated; there is no PRNU. Of flats of several times, above unknown dark charges, there is
+/// the same within its interval, which holds as often as is stated; there is no PRNU. Of flats of several times, above unknown dark charges, there is
 /// no responsivity either.
 #[test]
 fn clipped_darks_are_not_black() {
@@ -524,8 +524,8 @@ fn clipped_darks_are_not_black() {
                 assert!(why(&low, key).contains("clipped at code 0"), "{index}: {key}");
             }
             let [own, low] = [own, low].map(|found| found.get("responsivity_adu_per_photon").unwrap());
-            // Weights of the levels know the signal, and so differ a little.
-            assert!((own.value - low.value).abs() < 1e-2 * (low.high - low.low), "{index}: {own:?} {low:?}");
+            // Which levels count, and their weights, go by the signal: within the interval they differ.
+            assert!((own.value - low.value).abs() < 0.5 * (low.high - low.low), "{index}: {own:?} {low:?}");
             let truths: BTreeMap<&str, f64> = truths(&readout, index).into_iter().collect();
             Some((low.low..=low.high).contains(&truths["responsivity_adu_per_photon"]))
         })
