@@ -24,7 +24,7 @@ pub struct Offsets {
 }
 
 impl Offsets {
-    /// Whether no chance of a chart makes them: all of one sign, and all by [`Z`] standard errors.
+    /// Whether no chance of a chart makes them: all of one sign, and all by `Z` standard errors.
     pub fn are_told(&self) -> bool {
         let z: [f64; 3] = std::array::from_fn(|class| self.offset[class] / self.error[class]);
         z.iter().all(|z| *z > Z) || z.iter().all(|z| *z < -Z)
