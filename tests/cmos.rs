@@ -764,7 +764,7 @@ fn what_taps_and_drift_leave_open_is_refused() {
     let drift = drifting([26, 22], [900.0, 2500.0, 1800.0], 9.0);
     let camera = demosaicked(&plane_of(&digitized(&noisy(&drift, &settings(1)))), Method::Bilinear);
     assert!(why(&camera).contains("`black_drift_e`"), "{}", why(&camera));
-    assert!(PixelNoise::of(&camera.header).unwrap_err().to_string().contains("`black_drift_e`"));
+    assert!(PixelNoise::of(&camera.header).is_ok());
     let full = drifting([26, 22], [29_990.0, 2500.0, 1800.0], 9.0);
     assert!(why(&digitized(&noisy(&full, &settings(1)))).contains("black level drifts along rows, and full well"));
     let mut bent = drift;
@@ -847,21 +847,10 @@ fn one_tap_is_a_sensor_of_its_own() {
     }
 }
 
-/// Standard deviations beside pixels, at the border of taps and away from it: against the scatter of 3000 frames, each of another
-/// sensor, chi-square of 2999.
-#[test]
-fn sigma_knows_the_taps_of_each_photosite() {
-    for taps in several_taps() {
-        let mut scene = tapped([14, 12], [900.0, 2500.0, 1800.0], &taps);
-        with_readout(&mut scene, |readout| {
-            // Levels are taken to be the same behind all taps; read noise differs.
-            let taps = readout.taps.as_mut().unwrap();
-            (taps.gain, taps.offset_e) = (vec![], vec![]);
-            taps.read_noise_e.iter_mut().for_each(|noise| *noise *= 8.0);
-        });
-        let made =
-            |seed: u64| demosaicked(&plane_of(&digitized(&noisy(&scene, &settings(seed)))), Method::EffectiveColor);
-        let places: Vec<[usize; 2]> = (2..12).flat_map(|x| [[x, 5], [x, 6]]).collect();
+/// Standard deviations beside pixels against the scatter of 3000 frames, each of another sensor: chi-square of 2999.
+fn sigma_covers(what: &str, scene: &MemoryFrame, methods: &[Method], places: &[[usize; 2]]) {
+    for &method in methods {
+        let made = |seed: u64| demosaicked(&plane_of(&digitized(&noisy(scene, &settings(seed)))), method);
         let frames = 3000;
         let all: Vec<Vec<[f64; 3]>> = (0..frames)
             .into_par_iter()
@@ -879,10 +868,40 @@ fn sigma_knows_the_taps_of_each_photosite() {
             for c in 0..3 {
                 let square: f64 = all.iter().map(|frame| (frame[index][c] - mean[c]).powi(2)).sum();
                 let p = of_chi_square(square / predicted[(c, c)], n - 1.0);
-                assert!(p > 1e-6, "{taps:?} {place:?} {c}: {}", square / (n - 1.0) / predicted[(c, c)]);
+                let ratio = square / (n - 1.0) / predicted[(c, c)];
+                assert!(p > 1e-6, "{what} {method:?} {place:?} {c}: {ratio}");
                 smallest = smallest.min(p);
             }
         }
-        assert!(of_smallest(smallest, 3 * places.len()) > 1e-4, "{smallest}");
+        assert!(of_smallest(smallest, 3 * places.len()) > 1e-4, "{what} {method:?}: {smallest}");
+    }
+}
+
+/// At the border of taps and away from it.
+#[test]
+fn sigma_knows_the_taps_of_each_photosite() {
+    for taps in several_taps() {
+        let mut scene = tapped([14, 12], [900.0, 2500.0, 1800.0], &taps);
+        with_readout(&mut scene, |readout| {
+            // Levels are taken to be the same behind all taps; read noise differs.
+            let taps = readout.taps.as_mut().unwrap();
+            (taps.gain, taps.offset_e) = (vec![], vec![]);
+            taps.read_noise_e.iter_mut().for_each(|noise| *noise *= 8.0);
+        });
+        let places: Vec<[usize; 2]> = (2..12).flat_map(|x| [[x, 5], [x, 6]]).collect();
+        sigma_covers(&format!("{taps:?}"), &scene, &[Method::EffectiveColor], &places);
+    }
+}
+
+/// At each row, edges too, of a drift that is most of the noise, from knots nearer than stencils reach to those farther off than the
+/// frame. One that is left out, or taken to be the same in all rows, is half or twice the variance.
+#[test]
+fn sigma_knows_how_black_drifts() {
+    let methods = [Method::Bilinear, Method::EffectiveColor, Method::SmoothHue, Method::Malvar];
+    let places: Vec<[usize; 2]> = (0..13).flat_map(|y| [[4, y], [5, y]]).collect();
+    for rows in [2.0, 3.3, 40.0] {
+        let mut scene = drifting([10, 13], [900.0, 2500.0, 1800.0], rows);
+        with_readout(&mut scene, |readout| readout.black_drift_e = 80.0);
+        sigma_covers(&format!("{rows} rows"), &scene, &methods, &places);
     }
 }

@@ -50,8 +50,8 @@ pub fn nearest<'a>(
     }
     let distances = known.into_iter().map(|known| (strsim::damerau_levenshtein(known, typed), known));
     distances
-        .min_by_key(|(distance, _)| *distance)
         .filter(|(distance, known)| *distance <= farthest(known))
+        .min_by_key(|(distance, _)| *distance)
         .map(|(_, known)| known)
 }
 

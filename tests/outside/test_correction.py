@@ -170,6 +170,45 @@ class Correction(ProgramCase):
                 with self.subTest(words=words, name=name):
                     self.assertAlmostEqual(there.var() / told, 1, delta=5 * math.sqrt(2 / there.size) + 0.02)
 
+    def test_sigma_where_lines_come_off(self):
+        """What masked photosites tell of a row, or a column, is gone from all of it: noise, offsets and drift of the black level."""
+        shape, border, gain, bias, read_e, light_e = (1500, 120), 20, 0.5, 200.0, 40.0, 900.0
+        sensor = ["schema: cyanometer-sensor/2", "name: own", "readout:", f"  width: {shape[1]}", f"  height: {shape[0]}"]
+        sensor += ["  pixel_pitch_um: 5", "  cfa: rggb", "  full_well_e: 100000", "  dark_current_e_per_s: 0", "  temperature_k: 293"]
+        sensor += ["  dcnu: 0", "  prnu: 0", f"  read_noise_e: {read_e}", "  bits: 16", f"  bias_adu: {bias}", f"  adu_per_e: {gain}"]
+        rows = ["  row_noise_e: 30", "  dsnu_row_e: 40", "  black_drift_e: 50", "  black_drift_rows: 6"]
+        columns = ["  column_noise_e: 25", "  dsnu_column_e: 35"]
+        settings = "exposure: {exposure_s: 0.1, f_number: 8.0, lens_transmittance: 1.0}"
+        for by, lines in (("rows", rows), ("columns", columns)):
+            (self.directory / "own.yaml").write_text("\n".join(sensor + lines) + "\n")
+            area = [0, 0, border, shape[0]] if by == "rows" else [0, 0, shape[1], border]
+            lit = np.full(shape, light_e)
+            lit[: area[3], : area[2]] = 0
+            corrected = []
+            for index in range(4):
+                name = f"{by}{index}.raw"
+                shared = self.chance.normal(0, 70, (shape[0], 1) if by == "rows" else (1, shape[1]))
+                charge = self.chance.poisson(lit) + shared + self.chance.normal(0, read_e, shape)
+                (bias + gain * charge).round().astype("<u2").tofile(self.directory / name)
+                head = ["schema: cyanometer/1", "quantity: adu", "cfa: rggb", settings, f"masked_areas: [{area}]"]
+                (self.directory / f"{name}.yaml").write_text("\n".join(head) + "\n")
+                how = ["--raw", f"{shape[1]}x{shape[0]}:u16le", "--sensor", "own.yaml", "--black", by]
+                corrected.append(f"{by}{index}.exr")
+                self.run_program(["correct-frame", "-q", name, *how, "-o", corrected[-1]])
+            # The level of each line has the noise of its own border, a tenth of the variance; and so has the average of all.
+            self.run_program(["average-frames", "-q", *corrected, "-o", "all.exr"])
+            for name in (corrected[0], "all.exr"):
+                planes = self.frame(["demosaic", "-q", name, "--sigma", "--sensor", "own.yaml"])
+                for plane, first in (("R", border), ("B", border + 1)):
+                    site = np.s_[first + 4 :: 2, first + 4 :: 2]
+                    there = planes[plane][site].astype(float)
+                    told = np.mean(planes[f"sigma.{plane}"][site].astype(float) ** 2)
+                    # What a line shares counts along it: its variance is as sure as its lines are many. Five standard deviations.
+                    share, lines = (light_e + read_e**2, read_e**2 / border), min(there.shape)
+                    spread = math.sqrt(2 / there.size + 2 / lines * (share[1] / sum(share)) ** 2)
+                    with self.subTest(by=by, name=name, plane=plane):
+                        self.assertAlmostEqual(there.var() / told, 1, delta=5 * spread + 0.01)
+
     def test_copies_are_refused(self):
         self.codes("light.raw", 3000, 50)
         self.many("dark", 3, 500, 12)

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::formats::data::spectrum_file;
-use crate::names::nearest;
+use crate::formats::files::near_file;
 use clap::Command;
 use std::ffi::OsString;
 use std::io;
@@ -43,7 +43,7 @@ pub(super) fn advised(error: &Error, command: &Command) -> String {
             let words: Vec<OsString> = std::env::args_os().skip(1).collect();
             let path = Path::new(file);
             let hint = misplaced(file, command, &in_text(&words)).or_else(|| known_spectrum(path));
-            let hint = hint.or_else(|| near_file(path));
+            let hint = hint.or_else(|| near_file(path).map(|near| format!("did you mean `{near}`?")));
             hint.map_or_else(|| error.to_string(), |hint| format!("{error}; {hint}"))
         }
         _ => error.to_string(),
@@ -75,24 +75,6 @@ fn known_spectrum(path: &Path) -> Option<String> {
     let known = named.into_iter().find(|path| spectrum_file(path) != *path)?;
     let name = known.display();
     Some(format!("a spectrum of that name comes with the programs: `render-radiance {name}` makes a frame of it"))
-}
-
-/// The file in the same directory whose name is nearest to one that is not there.
-fn near_file(path: &Path) -> Option<String> {
-    /// A letter for so many may be off, and so many of an ending.
-    const LETTERS: usize = 5;
-    const ENDING: usize = 4;
-    /// So many files are looked at.
-    const LOOKED_AT: usize = 10_000;
-    let typed = path.file_name()?.to_str()?;
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-    let files = directory.unwrap_or(Path::new(".")).read_dir().ok()?.take(LOOKED_AT).flatten();
-    let mut names: Vec<String> = files.filter_map(|file| file.file_name().into_string().ok()).collect();
-    names.sort_unstable();
-    let is_same_stem = |known: &str| Path::new(known).file_stem() == path.file_stem();
-    let farthest = |known: &str| if is_same_stem(known) { ENDING } else { known.len().min(typed.len()) / LETTERS };
-    let near = nearest(typed, names.iter().map(String::as_str), farthest)?;
-    Some(format!("did you mean `{}`?", path.with_file_name(near).display()))
 }
 
 /// How an output is named, where a word that is none of an option looks like one and no output is named otherwise.
@@ -151,19 +133,6 @@ mod tests {
         let command = Command::new("test").arg(output).arg(Arg::new("form").long("output-format"));
         assert_eq!(output_hint("c.exr", &command, &[]), None);
         assert_eq!(output_hint("c.json", &command, &[]).as_deref(), Some("for an output write `-o c.json`"));
-    }
-
-    #[test]
-    fn a_file_that_is_not_there_may_be_another() {
-        let directory = tempfile::tempdir().unwrap();
-        for name in ["clear_zenith.csv", "a.exr", "b.exr"] {
-            std::fs::write(directory.path().join(name), "").unwrap();
-        }
-        let told = |name: &str| near_file(&directory.path().join(name));
-        let wanted = format!("did you mean `{}`?", directory.path().join("clear_zenith.csv").display());
-        assert_eq!(told("clear_zenit.csv"), Some(wanted));
-        assert!(["a.ex", "a.tiff"].iter().all(|name| told(name).unwrap().ends_with("a.exr`?")));
-        assert_eq!([told("hazy.csv"), told("dark.exr"), told("nodir/a.exr")], [None, None, None]);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::places::is_stack;
 use super::register;
 use super::standard::open_stdin;
 use crate::error::{Error, Result};
+use crate::names::nearest;
 use std::fs::File;
 use std::io::{self, Read, Seek};
 use std::path::Path;
@@ -86,6 +87,24 @@ pub fn read_table(input: impl Read, name: &str) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The file in the same directory whose name is nearest to one that is not there.
+pub fn near_file(path: &Path) -> Option<String> {
+    /// A letter for so many may be off, and so many of an ending.
+    const LETTERS: usize = 5;
+    const ENDING: usize = 4;
+    /// So many files are looked at.
+    const LOOKED_AT: usize = 10_000;
+    let typed = path.file_name()?.to_str()?;
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let files = directory.unwrap_or(Path::new(".")).read_dir().ok()?.take(LOOKED_AT).flatten();
+    let mut names: Vec<String> = files.filter_map(|file| file.file_name().into_string().ok()).collect();
+    names.sort_unstable();
+    let is_same_stem = |known: &str| Path::new(known).file_stem() == path.file_stem();
+    let farthest = |known: &str| if is_same_stem(known) { ENDING } else { known.len().min(typed.len()) / LETTERS };
+    let near = nearest(typed, names.iter().map(String::as_str), farthest)?;
+    Some(path.with_file_name(near).display().to_string())
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -95,6 +114,22 @@ pub(super) mod tests {
     fn what_never_ends_is_not_read_for_ever() {
         let complaint = read_file(Path::new("/dev/zero")).unwrap_err().to_string();
         assert!(complaint.contains("longer than 256 MiB"), "{complaint}");
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_may_be_another() {
+        let directory = tempfile::tempdir().unwrap();
+        for name in ["clear_zenith.csv", "a.exr", "b.exr"] {
+            std::fs::write(directory.path().join(name), "").unwrap();
+        }
+        let told = |name: &str| near_file(&directory.path().join(name));
+        let wanted = directory.path().join("clear_zenith.csv").display().to_string();
+        assert_eq!(told("clear_zenit.csv"), Some(wanted));
+        assert!(["a.ex", "a.tiff"].iter().all(|name| told(name).unwrap().ends_with("a.exr")));
+        // One of the same stem, though another's name is nearer.
+        std::fs::write(directory.path().join("clear"), "").unwrap();
+        assert!(told("clear_zenith").unwrap().ends_with("clear_zenith.csv"));
+        assert_eq!([told("hazy.csv"), told("dark.exr"), told("nodir/a.exr")], [None, None, None]);
     }
 
     /// Bytes as a file that stands at its start, or as what comes down a pipe, which holds them.

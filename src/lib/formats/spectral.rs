@@ -4,7 +4,7 @@
 use super::cells::MAX_CELLS;
 use super::csv::SpectralTable;
 use super::data::{near_spectrum, spectrum_file, without_data};
-use super::files::{named, open_named, read_table, spool};
+use super::files::{named, near_file, open_named, read_table, spool};
 use super::format::HEAD_BYTES;
 use super::input::{FrameReader, InputOptions};
 use super::radiance_unit::{self, Brightness, FileSays, times_white};
@@ -136,11 +136,13 @@ pub fn open(options: &InputOptions) -> Result<Radiances> {
     Ok(Radiances::Table(Box::new(SpectralTable::parse(&name, &bytes)?)))
 }
 
-/// A complaint of a file that is not there, with the spectrum of a data directory that may be meant, or that there are no data.
+/// A complaint of a file that is not there, with the file beside it, or the spectrum of a data directory, that may be meant, or that
+/// there are no data.
 pub fn with_near_name(error: Error, path: Option<&Path>) -> Error {
-    let advice = || match path.and_then(near_spectrum) {
-        Some(near) => Some(format!("did you mean `{near}`? `cyanometer list spectra` tells those known by name")),
-        None => path.and_then(without_data),
+    let advice = || {
+        let beside = path.and_then(near_file).map(|near| format!("did you mean `{near}`?"));
+        let of_data = |near| format!("did you mean `{near}`? `cyanometer list spectra` tells those known by name");
+        beside.or_else(|| path.and_then(near_spectrum).map(of_data)).or_else(|| path.and_then(without_data))
     };
     let is_missing = matches!(&error, Error::Disk { source, .. } if source.kind() == io::ErrorKind::NotFound);
     match (error, is_missing.then(advice).flatten()) {

@@ -1,5 +1,6 @@
 //! What is known about a frame: its quantity, its camera, and everything that was done to it.
 
+mod black_noise;
 mod converter;
 mod correction;
 mod difference;
@@ -7,6 +8,7 @@ mod header;
 mod levels;
 mod records;
 
+pub use black_noise::BlackNoise;
 pub use converter::AdcRecord;
 pub use correction::{
     AverageRecord, CorrectionRecord, DefectsRecord, DrawnExposures, ExposureSet, ExposuresRecord, FlatRecord,
@@ -15,9 +17,9 @@ pub use correction::{
 pub use difference::Difference;
 pub use header::FrameHeader;
 pub use records::{
-    AdaptationRecord, BlackNoise, CameraSettings, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut,
-    MatrixResidual, NoiseRecord, PoissonKind, PredictedRecord, ProfileRecord, RelativeMatrix, SamplesRecord, Scene,
-    TakenAs, UpsamplingRecord,
+    AdaptationRecord, CameraSettings, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
+    NoiseRecord, PoissonKind, PredictedRecord, ProfileRecord, RelativeMatrix, SamplesRecord, Scene, TakenAs,
+    UpsamplingRecord,
 };
 
 use crate::camera::levels::{BlackLevel, WhiteLevel};

@@ -242,17 +242,6 @@ pub struct ProfileRecord {
     pub range_adu: f64,
 }
 
-/// What a black level is uncertain by that was measured in the masked border of the frame, variances in ADU².
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct BlackNoise {
-    /// Of the level of each of the 2×2 sites, common to all its photosites.
-    pub site_adu2: f64,
-    /// Of what a row is off, common to its photosites.
-    pub row_adu2: f64,
-    /// Of what a column is off.
-    pub column_adu2: f64,
-}
-
 /// How colors were computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ColorRecord {

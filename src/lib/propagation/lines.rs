@@ -216,9 +216,7 @@ impl Photosite {
 
     /// What is shared as each class has it, with the part of the drift by such slopes to the charge.
     fn by_class(&self, row: &Matrix3<f64>, column: &Matrix3<f64>, slopes: [f64; 3]) -> [LineCovariance; 3] {
-        let of_dark = |dark: &Dark| dark.weight.powi(2) * dark.kept()[0] * dark.model.lines.black_drift_e.powi(2);
-        let drift = self.model.lines.black_drift_e.powi(2) + self.darks.iter().flatten().map(of_dark).sum::<f64>();
-        let drift_rows = self.models().map(|model| model.lines.black_drift_rows).fold(0.0, f64::max);
+        let [drift, drift_rows] = [self.drift_e2(None), self.drift_rows()];
         let of_class = |matrix: &Matrix3<f64>, k: usize| [0, 1, 2].map(|l| matrix[(k, l)]);
         [0, 1, 2].map(|k| LineCovariance {
             row: of_class(row, k),
@@ -227,6 +225,18 @@ impl Photosite {
             drift_rows,
             together: [0.0; 3],
         })
+    }
+
+    /// The variance of the drift of its black level along rows, with that of what came off; of an average of exposures where there is one.
+    pub(super) fn drift_e2(&self, average: Option<&AverageRecord>) -> f64 {
+        let of_dark = |dark: &Dark| dark.weight.powi(2) * dark.kept()[0] * dark.model.lines.black_drift_e.powi(2);
+        let of_darks: f64 = self.darks.iter().flatten().map(of_dark).sum();
+        self.model.lines.black_drift_e.powi(2) * kept_of_one(average) + of_darks
+    }
+
+    /// Rows from one knot of the drift to the next; 0 where there is none.
+    pub(super) fn drift_rows(&self) -> f64 {
+        self.models().map(|model| model.lines.black_drift_rows).fold(0.0, f64::max)
     }
 
     /// Whether its black level drifts along rows, or that of what came off.
@@ -351,10 +361,14 @@ impl Photosite {
     pub(super) fn line_terms(&self, average: Option<&AverageRecord>) -> [LineTerms; 2] {
         Axis::ALL.map(|axis| {
             let terms = self.terms(axis);
-            let of_one = 1.0 - average.map_or(1.0, |record| 1.0 / f64::from(record.frames.max(1)));
-            LineTerms { constant: terms.constant - of_one * axis.parts(&self.model.lines)[0].powi(2), ..terms }
+            terms.less((1.0 - kept_of_one(average)) * axis.parts(&self.model.lines)[0].powi(2))
         })
     }
+}
+
+/// The share of the temporal variance of an exposure that an average keeps.
+fn kept_of_one(average: Option<&AverageRecord>) -> f64 {
+    average.map_or(1.0, |record| 1.0 / f64::from(record.frames.max(1)))
 }
 
 /// What two photosites of signals x and y in one row, or column, share, in e²: a + b (x + y) + c x y.
@@ -368,6 +382,11 @@ pub(super) struct LineTerms {
 impl LineTerms {
     pub fn at(&self, x: f64, y: f64) -> f64 {
         self.constant + self.linear * (x + y) + self.square * x * y
+    }
+
+    /// Less what does not hang on signals.
+    pub fn less(&self, constant: f64) -> Self {
+        Self { constant: self.constant - constant, ..*self }
     }
 }
 

@@ -5,12 +5,14 @@
 //! reach of the weights, three photosites, is taken as level; photosites behind several amplifiers are taken to read the same level.
 
 use super::charge;
-use super::covariance::{Covariance, PAIRS};
+use super::covariance::Covariance;
 use super::ground::{corrected, quantity_of_sites};
 use super::level_variance::LevelVariance;
-use super::lines::{DRIFTING, LineTerms};
+use super::lines::DRIFTING;
 use super::moments::Equations;
 use super::photosite::Photosite;
+use super::pixel_gains::{PixelGains, phase_at};
+use super::pixel_lines::PixelLines;
 use super::repeated::average_of;
 use super::smooth_hue;
 use super::tapped::Axis;
@@ -23,7 +25,6 @@ use crate::metadata::{AdcRecord, AverageRecord, FrameHeader, NoiseRecord};
 use crate::names::Named;
 use crate::random::Source;
 use crate::stages::demosaic::Method;
-use crate::stages::demosaic::stencil::{Stencil, phase};
 use crate::stages::demosaic::weights::WeightTable;
 use crate::stages::noise::NoiseModel;
 use crate::units::QuantityKind;
@@ -89,20 +90,6 @@ impl Places {
     }
 }
 
-/// Gains of three variances, those of the classes or of the black level, for the six covariances, as polynomials in the pixel's
-/// hues: with weights f + ρ h, cov(k, m) = Σ \[f f + ρ_k h f + ρ_m f h + ρ_k ρ_m h h] σ².
-#[derive(Debug, Clone, PartialEq)]
-struct PixelGains<const N: usize = 3>([[[f64; N]; 4]; 6]);
-
-/// What photosites share by rows and by columns, at any pixel.
-#[derive(Debug, Clone, PartialEq)]
-struct PixelLines {
-    /// Gains of the covariances of pairs of classes, in rows and in columns.
-    gains: Vec<PixelGains<{ 2 * PAIRS.len() }>>,
-    terms: [LineTerms; 2],
-    photosite: Photosite,
-}
-
 /// Most amplifiers of a sensor.
 const TAPS: usize = 4;
 
@@ -145,115 +132,6 @@ impl PixelGains<{ 3 * TAPS }> {
     }
 }
 
-impl PixelLines {
-    /// The covariances of pairs of classes at levels above black.
-    fn at(&self, level: [f64; 3]) -> [f64; 2 * PAIRS.len()] {
-        let full_well_e = self.photosite.model.full_well_e;
-        // `max` drops what is no number.
-        let expected_e = level.map(|level| self.photosite.expected_at(level.max(0.0)).max(0.0).min(full_well_e));
-        let x = self.photosite.line_signals(expected_e);
-        let dark_e = self.photosite.model.dark_e;
-        let slope = expected_e.map(|e| self.photosite.adc.map_or(1.0, |adc| adc.sample_per_e(e + dark_e)));
-        std::array::from_fn(|index| {
-            let [k, l] = PAIRS[index % PAIRS.len()];
-            slope[k] * slope[l] * self.terms[index / PAIRS.len()].at(x[k], x[l])
-        })
-    }
-}
-
-impl PixelGains<{ 2 * PAIRS.len() }> {
-    /// Those of what pairs of classes share in rows, then in columns.
-    fn of_lines(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
-        let phase = phase_at(at, geometry);
-        let class = |offset| table.class(phase, offset) as usize;
-        Self::by(table, at, geometry, |a, b| {
-            let mut sums = [0.0; 2 * PAIRS.len()];
-            for (here, weight) in a.sites() {
-                for (there, other) in b.sites() {
-                    let [k, l] = [class(here), class(there)];
-                    let pair = PAIRS.iter().position(|pair| *pair == [k.min(l), k.max(l)]).unwrap_or_default();
-                    sums[pair] += if here[1] == there[1] { weight * other } else { 0.0 };
-                    sums[PAIRS.len() + pair] += if here[0] == there[0] { weight * other } else { 0.0 };
-                }
-            }
-            sums
-        })
-    }
-}
-
-impl PixelGains {
-    /// Those of the classes.
-    fn new(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
-        let phase = phase_at(at, geometry);
-        let class = |offset| table.class(phase, offset) as usize;
-        Self::by(table, at, geometry, |a, b| {
-            let mut sums = [0.0; 3];
-            for (offset, weight) in a.sites() {
-                sums[class(offset)] += weight * b.at(offset);
-            }
-            sums
-        })
-    }
-
-    /// Those of what the photosites of a row, of a column and of a site of 2×2 have in common.
-    fn of_black(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
-        let is_even = |distance: isize| distance & 1 == 0;
-        Self::by(table, at, geometry, |a, b| {
-            let mut sums = [0.0; 3];
-            for ([x, y], weight) in a.sites() {
-                for ([other_x, other_y], other) in b.sites() {
-                    let both = weight * other;
-                    sums[0] += if y == other_y { both } else { 0.0 };
-                    sums[1] += if x == other_x { both } else { 0.0 };
-                    sums[2] += if is_even(x - other_x) && is_even(y - other_y) { both } else { 0.0 };
-                }
-            }
-            sums
-        })
-    }
-}
-
-impl<const N: usize> PixelGains<N> {
-    fn by(
-        table: &WeightTable,
-        at: [usize; 2],
-        geometry: &Geometry,
-        dot: impl Fn(&Stencil, &Stencil) -> [f64; N],
-    ) -> Self {
-        let phase = phase_at(at, geometry);
-        let folded = |stencil: &Stencil| stencil.folded(at, [geometry.width, geometry.height]);
-        let [fixed, of_hue] = [table.fixed(phase), table.of_hue(phase)].map(|stencils| stencils.each_ref().map(folded));
-        Self(PAIRS.map(|[k, m]| {
-            [
-                dot(&fixed[k], &fixed[m]),
-                dot(&of_hue[k], &fixed[m]),
-                dot(&fixed[k], &of_hue[m]),
-                dot(&of_hue[k], &of_hue[m]),
-            ]
-        }))
-    }
-
-    fn covariance(&self, variances: [f64; N], hues: Option<[f64; 3]>) -> Covariance {
-        let sum = |gains: &[f64; N]| {
-            let (first, rest) = (gains[0] * variances[0], gains.iter().zip(variances).skip(1));
-            rest.fold(first, |sum, (gain, variance)| sum + gain * variance)
-        };
-        let mut covariance = [0.0; 6];
-        for ((value, [k, m]), gains) in covariance.iter_mut().zip(PAIRS).zip(&self.0) {
-            *value = sum(&gains[0]);
-            if let Some(hue) = hues {
-                *value += hue[k] * sum(&gains[1]) + hue[m] * sum(&gains[2]) + hue[k] * hue[m] * sum(&gains[3]);
-            }
-        }
-        covariance
-    }
-}
-
-fn phase_at(at: [usize; 2], geometry: &Geometry) -> usize {
-    let origin = geometry.origin.map(i64::from);
-    phase(origin[0] + at[0] as i64, origin[1] + at[1] as i64)
-}
-
 impl PixelNoise {
     /// The noise of the pixels of a demosaicked frame.
     ///
@@ -281,7 +159,7 @@ impl PixelNoise {
         };
         let is_followed = photosite.check_tails([0.0; 3]).and_then(|()| photosite.check_lines(false));
         is_followed.and_then(|()| photosite.check_flat()).map_err(|why| frame.refuse(why.to_string()))?;
-        if photosite.drifts() {
+        if photosite.drifts() && photosite.flat.is_some() {
             return Err(frame.refuse(DRIFTING));
         }
         let average = match &metadata.average {
@@ -293,18 +171,16 @@ impl PixelNoise {
             }
             None => None,
         };
-        let of_lines = photosite.has_lines().then(|| PixelLines {
-            gains: places().map(|at| PixelGains::of_lines(table, at, &frame.geometry)).collect(),
-            terms: photosite.line_terms(average.as_ref()),
-            photosite,
-        });
+        let kinds: Vec<[usize; 2]> = places().collect();
+        let of_lines =
+            photosite.has_lines().then(|| PixelLines::of(photosite, average.as_ref(), table, &kinds, &frame.geometry));
         let of_black = metadata
             .black_noise
             .map(|noise| (gains(PixelGains::of_black), [noise.row_adu2, noise.column_adu2, noise.site_adu2]));
         let gains = gains(PixelGains::new);
         let variances = LevelVariance::of_classes(&photosite, average.as_ref(), largest);
         let of_taps = match frame.taps() {
-            Some(_) => Some(pixel_taps(frame, table, places().collect(), average.as_ref(), &photosite)?),
+            Some(_) => Some(pixel_taps(frame, table, kinds, average.as_ref(), &photosite)?),
             None => None,
         };
         let depends_on_hue = table.depends_on_hue();
@@ -321,19 +197,19 @@ impl PixelNoise {
         let kind = self.rows.kind(y) * self.columns.examples.len() + self.columns.kind(x);
         let level = rgb.map(|sample| sample - self.black);
         let all = |mut variances: [f64; 3], hues: Option<[f64; 3]>| {
-            let shared = self.of_lines.as_ref().map(|lines| (&lines.gains[kind], lines.at(level)));
-            if let Some((_, shared)) = &shared {
-                for (k, variance) in variances.iter_mut().enumerate() {
-                    let own = PAIRS.iter().position(|pair| *pair == [k, k]).unwrap_or_default();
-                    *variance = (*variance - shared[own] - shared[PAIRS.len() + own]).max(0.0);
-                }
+            if let Some(lines) = &self.of_lines {
+                let shared = lines.of_sites(level);
+                variances
+                    .iter_mut()
+                    .zip(shared)
+                    .for_each(|(variance, shared)| *variance = (*variance - shared).max(0.0));
             }
             let mut covariance = match &self.of_taps {
                 Some(taps) => taps.gains[kind].covariance(taps.at(level), hues),
                 None => self.gains[kind].covariance(variances, hues),
             };
-            if let Some((gains, shared)) = shared {
-                let more = gains.covariance(shared, hues);
+            if let Some(lines) = &self.of_lines {
+                let more = lines.covariance(kind, y, level, hues);
                 covariance.iter_mut().zip(more).for_each(|(covariance, more)| *covariance += more);
             }
             if let Some((gains, of_black)) = &self.of_black {
@@ -425,7 +301,7 @@ fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
         Some(noise) => noise.clone(),
         None => whole_noise(frame)?,
     };
-    let model = NoiseModel::of(frame, &noise)?;
+    let model = less_border(frame, NoiseModel::of(frame, &noise)?);
     let photosite = Photosite::of_electrons(model, Equations::Exact);
     let found = match metadata.quantity {
         QuantityKind::Electrons | QuantityKind::ExpectedElectrons => (photosite, metadata.dark_signal_e.unwrap_or(0.0)),
@@ -437,6 +313,21 @@ fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
         }
     };
     Ok(found)
+}
+
+/// The model of what is left where the level of each row, or column, came off as its masked photosites have it: what does not hang on light
+/// is theirs too. The noise of that level is in the metadata.
+fn less_border(frame: &FrameHeader, model: NoiseModel) -> NoiseModel {
+    let is_by_lines = frame.metadata.correction.as_ref().is_some_and(|correction| correction.black_deltas);
+    let Some(noise) = frame.metadata.black_noise.filter(|_| is_by_lines) else { return model };
+    let mut lines = model.lines;
+    if noise.row_adu2 > 0.0 {
+        (lines.row_noise_e, lines.dsnu_row_e, lines.black_drift_e) = (0.0, 0.0, 0.0);
+    }
+    if noise.column_adu2 > 0.0 {
+        (lines.column_noise_e, lines.dsnu_column_e) = (0.0, 0.0);
+    }
+    NoiseModel { lines, ..model }
 }
 
 /// What codes without light are above the black level of the metadata, in ADU. That of a camera is often the converter's, and counts no

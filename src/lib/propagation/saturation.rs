@@ -48,8 +48,12 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
         Ok(FramePrediction::Tapped(pixels)) => pixels.each_kind().collect(),
         Err(_) => return true,
     };
-    let is_beyond = |(level, (mean, std)): (f32, (f64, f64))| f64::from(level) - mean > OUT_OF_REACH * std;
+    let is_beyond = |(level, (mean, std)): (f32, (f64, f64))| is_out_of_reach(f64::from(level), mean, std);
     !moments.into_iter().all(|moments| levels.classes().into_iter().zip(moments).all(is_beyond))
+}
+
+fn is_out_of_reach(level: f64, mean: f64, std: f64) -> bool {
+    level - mean > OUT_OF_REACH * std
 }
 
 /// Whether the charge of each class, with all that is added to it, is as far below the level: what can be told in no time of frames that
@@ -69,7 +73,7 @@ fn are_far_below(frame: &FrameHeader, levels: &FullLevels) -> bool {
             _ => return false,
         };
         let charge = charge(model, expected_e);
-        level_e - charge.mean > OUT_OF_REACH * charge.variance.max(0.0).sqrt().hypot(model.added())
+        is_out_of_reach(level_e, charge.mean, charge.variance.max(0.0).sqrt().hypot(model.added()))
     };
     levels.classes().into_iter().zip(ground.smeared.expected_e).all(is_far)
 }

@@ -152,15 +152,19 @@ impl Photosite {
         }
         let sum: f64 = kinds.iter().map(|(_, weight)| weight).sum();
         let amplitude_e = self.most(|tails| tails.rts_e);
-        let jumps_show =
-            |hot: f64| trap_share > 0.0 && self.at(&State { hot, trap: 0.0 }).jumps_show(expected_e, amplitude_e);
-        let of_hot = kinds.iter().skip(1).filter(|(hot, _)| jumps_show(*hot)).map(|(_, weight)| weight / sum);
+        let jumps_show = kinds.iter().map(|(hot, _)| {
+            trap_share > 0.0 && self.at(&State { hot: *hot, trap: 0.0 }).jumps_show(expected_e, amplitude_e)
+        });
+        let jumps_show: Vec<bool> = jumps_show.collect();
+        let of_hot =
+            kinds.iter().zip(&jumps_show).skip(1).filter(|(_, show)| **show).map(|((_, weight), _)| weight / sum);
         let matter_if_hot = self.jumps_matter(expected_e, trap_share * of_hot.sum::<f64>());
         let mut found = Vec::new();
         let mut foreseen = effort::Foreseen::of(kinds.len() - 1);
         // Most photosites first, then hot ones from all over, which tell early how much work all are.
         let order = std::iter::once(0).chain(effort::scattered(kinds.len() - 1).map(|index| index + 1));
-        for (hot, weight) in order.map(|index| kinds[index]).map(|(t, weight)| (t, weight / sum)) {
+        for index in order {
+            let (hot, weight) = (kinds[index].0, kinds[index].1 / sum);
             if hot > 0.0 {
                 foreseen.begin_next();
             }
@@ -168,7 +172,7 @@ impl Photosite {
                 break;
             }
             let quiet = self.at(&State { hot, trap: 0.0 });
-            let jumps_apart = (hot == 0.0 || matter_if_hot) && jumps_show(hot);
+            let jumps_apart = (hot == 0.0 || matter_if_hot) && jumps_show[index];
             let is_free = trap_share > 0.0 && !jumps_apart;
             let share = if jumps_apart { 1.0 - trap_share } else { 1.0 };
             found.push(Kind { weight: weight * share, is_free, value: of(&quiet) });

@@ -7,7 +7,7 @@ use crate::formats::input::FrameReader;
 use crate::formats::stack::FrameStack;
 use crate::frame::to_sample;
 use crate::metadata::{AverageRecord, Coverage, ExposuresRecord, FrameHeader};
-use crate::numerics::averages::{CLIP, Combine, average};
+use crate::numerics::averages::{CLIP, Combine, Kept, average};
 use crate::numerics::running::Running;
 use crate::sigma::{PixelLayers, is_layer};
 use crate::stages::exposures::{Exposures, too_few};
@@ -209,12 +209,18 @@ impl Averaged {
         let mut record = averaging.record(frames);
         let mut warnings = Vec::new();
         let metadata = &mut header.metadata;
+        let own = record;
         if let Some(before) = &metadata.average {
             record = AverageRecord { frames: before.frames.saturating_mul(record.frames), ..record };
         }
         let name = averaging.name();
         metadata.averaged = seen.exposures.drawn();
         metadata.average = Some(ExposuresRecord::of(record, metadata.quantity, metadata.demosaic.is_some()));
+        /// Codes over which what is averaged scatters, so that rounding counts for nothing.
+        const MANY_CODES: f64 = 16.0;
+        // Each frame's black level has the noise of its own border, which is averaged as that of the frames.
+        let kept = Kept::of(own.combine, own.frames, own.clip.unwrap_or(CLIP), MANY_CODES).variance;
+        metadata.black_noise = seen.exposures.black_noise().map(|noise| noise.times(kept));
         (metadata.predicted, metadata.uncertainty, metadata.saturated_share, metadata.samples) =
             (None, None, None, None);
         metadata.mask_bits.clear();

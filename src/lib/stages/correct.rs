@@ -3,13 +3,14 @@
 //! First what no light reads is subtracted, as a constant or as the mean of dark frames, sample by sample; then the
 //! transfer of what is left is undone. Values become signed and fractional: clipping them at zero would bias means.
 
-use crate::camera::levels::{BlackLevels, RowBlack};
+use crate::camera::levels::{BlackLevels, RowBlack, WhiteLevel};
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{CorrectionRecord, DefectsRecord, FlatRecord, FrameHeader, Metadata};
 use crate::stages::black::{Black, white_left};
 use crate::stages::darks::{DarkStack, check_codes, check_setting};
+use crate::stages::saturation::FullLevels;
 use crate::stages::transfer::{Transfer, uniform_share};
 use crate::stream::{Counts, Stage};
 use crate::units::{Adu, QuantityKind};
@@ -175,7 +176,14 @@ fn note_levels(
 ) -> Result<()> {
     let pattern = input.metadata.cfa.and_then(FilterArray::bayer);
     let left = |white| off.map(|off| white_left(white, off, &input.geometry, pattern));
-    metadata.white_level_adu = metadata.white_level_adu.and_then(left);
+    let is_by_lines = off.is_some_and(BlackLevels::has_deltas) && metadata.adc.is_none();
+    // Once rows or columns have levels of their own, no charge tells which samples were full.
+    let full = FullLevels::of(input).filter(|_| is_by_lines);
+    let full = full.map(|levels| match levels.classes().map(f64::from) {
+        [red, green, blue] if red == green && green == blue => WhiteLevel::Uniform(red),
+        levels => WhiteLevel::Classes(levels),
+    });
+    metadata.white_level_adu = full.or(metadata.white_level_adu).and_then(left);
     match (input.black_levels()?, off) {
         (Some(known), Some(off)) if known == *off => metadata.set_black_adu(Some(0.0.into())),
         (Some(_), Some(off)) => {

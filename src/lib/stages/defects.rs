@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Geometry, Rows, Window, to_sample};
 use crate::metadata::FrameHeader;
 use crate::numerics::normal::{cumulative, density};
+use crate::numerics::robust::NORMAL_MEDIAN;
 use crate::stages::saturation::{CORRECTED, DEFECTIVE, SATURATED, bits, with_mask};
 use crate::stages::sites::SiteClasses;
 use crate::stream::{Counts, RowSource, Stage};
@@ -237,8 +238,6 @@ impl Survey {
 
     /// Lower and upper limits of each class, so many standard deviations off; these are at least `least`.
     pub fn limits(self, beyond: f64, least: f64) -> Vec<[f64; 2]> {
-        /// Standard deviations to the median deviation of a normal law.
-        const NORMAL: f64 = 1.482_602_218_505_602;
         let limits = |mut values: Vec<f32>| {
             if values.is_empty() {
                 return [f64::NEG_INFINITY, f64::INFINITY];
@@ -247,7 +246,7 @@ impl Survey {
             let mut off: Vec<f32> = values.iter().map(|value| to_sample((f64::from(*value) - center).abs())).collect();
             let [deviation, step] = grouped_median(&mut off);
             // What is rounded may lie half a step farther off.
-            let reach = beyond * (NORMAL * deviation).max(least) + 0.5 * step;
+            let reach = beyond * (deviation / NORMAL_MEDIAN).max(least) + 0.5 * step;
             [center - reach, center + reach]
         };
         self.classes.into_iter().map(limits).collect()

@@ -1,7 +1,7 @@
 //! Exposures of one scene by one camera: whether frames that come one after another are.
 
 use crate::error::{Error, Result};
-use crate::metadata::{Difference, DrawnExposures, ExposureSet, FrameHeader, Metadata, SamplesRecord};
+use crate::metadata::{BlackNoise, Difference, DrawnExposures, ExposureSet, FrameHeader, Metadata, SamplesRecord};
 use std::collections::HashMap;
 
 /// What is known of exposures that came so far.
@@ -13,6 +13,9 @@ pub struct Exposures {
     unlike: Option<String>,
     /// Those whose metadata tell their seed and number.
     drawn: ExposureSet,
+    /// Sum of what the black level of each is uncertain by, which was measured in its own border.
+    black_noise: Option<BlackNoise>,
+    count: u32,
     /// By the digest of its samples, what each is called whose sidecar tells it.
     by_digest: HashMap<String, String>,
 }
@@ -20,8 +23,9 @@ pub struct Exposures {
 impl Exposures {
     /// Those that `first` begins.
     pub fn of(first: &FrameHeader) -> Self {
-        let (head, drawn, by_digest) = (first.without_exposure(), ExposureSet::default(), HashMap::new());
-        let mut exposures = Self { first: first.clone(), head, unlike: None, drawn, by_digest };
+        let (head, drawn, by_digest) = (without_border(first), ExposureSet::default(), HashMap::new());
+        let black_noise = first.metadata.black_noise;
+        let mut exposures = Self { first: first.clone(), head, unlike: None, drawn, black_noise, count: 1, by_digest };
         // Runs of one frame that overlap are told by no other.
         first.drawn().into_iter().for_each(|run| _ = exposures.drawn.insert(run));
         exposures.by_digest.extend(digest(first).map(|digest| (digest, first.name.clone())));
@@ -36,6 +40,11 @@ impl Exposures {
     /// The first frame; where charge has spilled in others, it tells of the one that has most.
     pub fn first(&self) -> &FrameHeader {
         &self.first
+    }
+
+    /// What their black levels are uncertain by on average, where each has its own.
+    pub fn black_noise(&self) -> Option<BlackNoise> {
+        self.black_noise.map(|sum| sum.times(1.0 / f64::from(self.count)))
     }
 
     /// What they differ in beside what tells exposures apart, in words; none where that is nothing.
@@ -64,7 +73,9 @@ impl Exposures {
                 "its samples are those of {other}, by the digests of both; copies of one exposure do not count as two"
             )));
         }
-        let head = frame.without_exposure();
+        self.black_noise = self.black_noise.zip(frame.metadata.black_noise).map(|(sum, noise)| sum.plus(&noise));
+        self.count += 1;
+        let head = without_border(frame);
         if self.unlike.is_none() && head != self.head {
             let differs = match Difference::of([&head.metadata, &self.head.metadata]) {
                 Some(Difference { key, values: [its, theirs] }) => {
@@ -123,6 +134,17 @@ impl Exposures {
             first.name
         )))
     }
+}
+
+/// What tells more than the exposure: not the level that its own border told.
+fn without_border(frame: &FrameHeader) -> FrameHeader {
+    let mut head = frame.without_exposure();
+    if let (Some(noise), Some(correction)) = (&mut head.metadata.black_noise, &mut head.metadata.correction) {
+        // By which lines it was told is the same of all.
+        *noise = noise.signs();
+        correction.black_adu = 0.0.into();
+    }
+    head
 }
 
 /// What is known of the camera and of how it was set, and nothing else.

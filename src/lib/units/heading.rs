@@ -540,8 +540,11 @@ mod tests {
 
     #[test]
     fn names_that_contradict_their_units_are_told() {
-        use OtherUnit::{Contradiction, Irradiance, Mean};
+        use OtherUnit::{Contradiction, Irradiance, Mean, Undivided};
         for (text, kind) in [
+            ("radiance (W m-2 sr nm)", Undivided),
+            ("L [W m-2 sr-1 nm]", Undivided),
+            ("irradiance (W m-2 nm)", Undivided),
             ("irradiance (W m-2 sr-1 nm-1)", Contradiction),
             ("Irradiance, W m-2 sr-1 nm-1", Contradiction),
             ("edir [mW m-2 sr-1 nm-1]", Contradiction),

@@ -112,6 +112,8 @@ pub enum OtherUnit {
     Several,
     /// A mean over all directions, as libRadtran's `uavg`.
     Mean,
+    /// Behind what divides stand steradians or lengths that no power or stroke makes divisors: `W m-2 sr nm`.
+    Undivided,
     /// A unit of radiance beside the name of another quantity, or the unit of another beside the name of radiance.
     Contradiction,
     /// Of light as the eye weights it.
@@ -147,6 +149,9 @@ impl OtherUnit {
             }
             Self::Several => "two units of radiance; say in which they are",
             Self::Mean => "a mean over all directions, not the radiance of one",
+            Self::Undivided => {
+                "times sr or a length as it is written; what divides has a power, as in `W m-2 sr-1 nm-1`, or stands behind a stroke"
+            }
             Self::Contradiction => "the name of one quantity beside the unit of another, one of which is wrong",
             Self::Photometric => "of light as the eye weights it, from which no spectrum of energy follows",
             Self::Energy => "of energy, a radiance summed over time, which has no s-1",
@@ -179,6 +184,7 @@ impl OtherUnit {
             | Self::Scaled
             | Self::BesideFactor
             | Self::Several
+            | Self::Undivided
             | Self::Contradiction
             | Self::Relative
             | Self::Unknown => return None,
@@ -258,6 +264,10 @@ pub(super) fn units_among(tokens: &[Token]) -> Vec<Found> {
     let heads =
         |place: usize| matches!(known(place), Some((Base::Power(_) | Base::Photons | Base::Energy(_), None | Some(1))));
     let is_divisor = |place: usize| known(place).is_some_and(|(_, exponent)| exponent.is_some_and(|power| power < 0));
+    let is_multiplied = |place: usize| {
+        let factor = (place < tokens.len()).then(|| known(place)).flatten();
+        matches!(factor, Some((Base::SolidAngle | Base::Length(_), None)))
+    };
     let mut found: Vec<Found> = Vec::new();
     for place in (0..tokens.len()).filter(|&place| heads(place)) {
         let mut begin = place;
@@ -291,6 +301,10 @@ pub(super) fn units_among(tokens: &[Token]) -> Vec<Found> {
                 (None, Ok(unit)) => Stated::Radiance(unit),
                 (Some(scale), Ok(unit)) => {
                     scaled(unit, scale).map_or(Stated::Other { text, kind: OtherUnit::Scaled }, Stated::Radiance)
+                }
+                (_, Err(OtherUnit::Irradiance | OtherUnit::AllWavelengths)) if is_multiplied(end) => {
+                    end = (end..tokens.len()).find(|&place| !is_multiplied(place)).unwrap_or(tokens.len());
+                    Stated::Other { text: shown(&tokens[from..end]), kind: OtherUnit::Undivided }
                 }
                 (_, Err(kind)) => Stated::Other { text, kind },
             };

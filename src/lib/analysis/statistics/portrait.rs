@@ -300,30 +300,21 @@ impl Foreseen {
             }
             FramePrediction::Groups(groups) => {
                 let MeanVariance { mean, variance } = pooled(groups)[index].moments;
-                Self {
-                    mean,
-                    stds: vec![variance.max(0.0).sqrt()],
-                    has_few_far: false,
-                    profile_std: None,
-                    correlations: None,
-                }
+                Self::of_moments(mean, variance)
             }
             FramePrediction::Pixels(mixture) => Self::of_pixels(mixture, index, patches),
-            FramePrediction::Tapped(pixels) => {
-                let (mean, variance) = (pixels.mean[index], pixels.covariance[(index, index)]);
-                Self {
-                    mean,
-                    stds: vec![variance.max(0.0).sqrt()],
-                    has_few_far: false,
-                    profile_std: None,
-                    correlations: None,
-                }
-            }
+            FramePrediction::Tapped(pixels) => Self::of_moments(pixels.mean[index], pixels.covariance[(index, index)]),
         };
         // Of a level that drifts from row to row no profile is told.
         let drifts = matches!(prediction, FramePrediction::Planes(classes) if classes[index].lines.drift != [0.0; 3]);
         let is_moved = is_moved || drifts;
         if is_moved { Self { profile_std: None, correlations: None, ..foreseen } } else { foreseen }
+    }
+
+    /// Of what no more is told than its moments.
+    fn of_moments(mean: f64, variance: f64) -> Self {
+        let stds = vec![variance.max(0.0).sqrt()];
+        Self { mean, stds, has_few_far: false, profile_std: None, correlations: None }
     }
 
     fn of_pixels(mixture: &PixelMoments, index: usize, patches: [[usize; 2]; 2]) -> Self {

@@ -1,0 +1,98 @@
+//! What the photosites of a row, or of a column, share, in the covariance of a demosaicked pixel.
+
+use super::covariance::{Covariance, PAIRS};
+use super::lines::LineTerms;
+use super::photosite::Photosite;
+use super::pixel_drift::PixelDrift;
+use super::pixel_gains::{PixelGains, phase_at};
+use crate::frame::Geometry;
+use crate::metadata::AverageRecord;
+use crate::stages::demosaic::weights::WeightTable;
+
+/// What photosites share by rows and by columns, at any pixel.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PixelLines {
+    /// Gains of the covariances of pairs of classes, in rows and in columns.
+    gains: Vec<PixelGains<{ 2 * PAIRS.len() }>>,
+    terms: [LineTerms; 2],
+    drift: Option<PixelDrift>,
+    photosite: Photosite,
+}
+
+impl PixelLines {
+    /// Of the photosites of a frame, an average or not, of which such places are the kinds of pixels.
+    pub fn of(
+        photosite: Photosite,
+        average: Option<&AverageRecord>,
+        table: &WeightTable,
+        kinds: &[[usize; 2]],
+        geometry: &Geometry,
+    ) -> Self {
+        let drift = photosite.drifts().then(|| PixelDrift::of(&photosite, average, table, kinds, geometry));
+        let [rows, columns] = photosite.line_terms(average);
+        Self {
+            gains: kinds.iter().map(|&at| PixelGains::of_lines(table, at, geometry)).collect(),
+            terms: [drift.as_ref().map_or(rows, |drift| drift.off(rows)), columns],
+            drift,
+            photosite,
+        }
+    }
+
+    /// The covariances of pairs of classes at levels above black, less the drift of that, and the slopes of their samples to the charge.
+    fn at(&self, level: [f64; 3]) -> ([f64; 2 * PAIRS.len()], [f64; 3]) {
+        let full_well_e = self.photosite.model.full_well_e;
+        // `max` drops what is no number.
+        let expected_e = level.map(|level| self.photosite.expected_at(level.max(0.0)).max(0.0).min(full_well_e));
+        let x = self.photosite.line_signals(expected_e);
+        let dark_e = self.photosite.model.dark_e;
+        let slopes = expected_e.map(|e| self.photosite.adc.map_or(1.0, |adc| adc.sample_per_e(e + dark_e)));
+        let shared = std::array::from_fn(|index| {
+            let [k, l] = PAIRS[index % PAIRS.len()];
+            slopes[k] * slopes[l] * self.terms[index / PAIRS.len()].at(x[k], x[l])
+        });
+        (shared, slopes)
+    }
+
+    /// What photosites of such levels share with others, of their variance.
+    pub fn of_sites(&self, level: [f64; 3]) -> [f64; 3] {
+        let (shared, slopes) = self.at(level);
+        std::array::from_fn(|class| {
+            let own = PAIRS.iter().position(|pair| *pair == [class, class]).unwrap_or_default();
+            let drift = self.drift.as_ref().map_or(0.0, |drift| drift.of_site(slopes[class]));
+            shared[own] + shared[PAIRS.len() + own] + drift
+        })
+    }
+
+    /// What of the covariance of a pixel of a kind, in a row of the frame, photosites of such levels make by what they share.
+    pub fn covariance(&self, kind: usize, row: usize, level: [f64; 3], hues: Option<[f64; 3]>) -> Covariance {
+        let (shared, slopes) = self.at(level);
+        let of_lines = self.gains[kind].covariance(shared, hues);
+        match &self.drift {
+            Some(drift) => {
+                let of_drift = drift.covariance(kind, row, slopes, hues);
+                std::array::from_fn(|pair| of_lines[pair] + of_drift[pair])
+            }
+            None => of_lines,
+        }
+    }
+}
+
+impl PixelGains<{ 2 * PAIRS.len() }> {
+    /// Those of what pairs of classes share in rows, then in columns.
+    fn of_lines(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
+        let phase = phase_at(at, geometry);
+        let class = |offset| table.class(phase, offset) as usize;
+        Self::by(table, at, geometry, |a, b| {
+            let mut sums = [0.0; 2 * PAIRS.len()];
+            for (here, weight) in a.sites() {
+                for (there, other) in b.sites() {
+                    let [k, l] = [class(here), class(there)];
+                    let pair = PAIRS.iter().position(|pair| *pair == [k.min(l), k.max(l)]).unwrap_or_default();
+                    sums[pair] += if here[1] == there[1] { weight * other } else { 0.0 };
+                    sums[PAIRS.len() + pair] += if here[0] == there[0] { weight * other } else { 0.0 };
+                }
+            }
+            sums
+        })
+    }
+}
