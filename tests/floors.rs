@@ -407,6 +407,19 @@ fn programs_are_thin() {
     );
 }
 
+/// To link each program a second time, for tests that it has none of, takes a minute.
+#[test]
+fn programs_with_tests_are_tested() {
+    let script = fs::read_to_string(PathBuf::from(TREE).join("scripts/test")).unwrap();
+    let programs = ["src/bin", "studies/src/bin"].into_iter().flat_map(sources);
+    for source in programs.filter(|source| source.code.contains("#[test]")) {
+        let (_, place) = source.path.split_once("bin/").unwrap();
+        let program = place.split(['/', '.']).next().unwrap();
+        let wanted = format!("--bin {program} ");
+        assert!(script.contains(&wanted), "{} has tests; scripts/test must name it: `{wanted}`", source.path);
+    }
+}
+
 /// A file has one subject; beyond this many lines before its tests it has several.
 const FILE_LINES: usize = 500;
 

@@ -209,6 +209,27 @@ class Correction(ProgramCase):
                     with self.subTest(by=by, name=name, plane=plane):
                         self.assertAlmostEqual(there.var() / told, 1, delta=5 * spread + 0.01)
 
+    def test_full_wells_are_known_where_lines_come_off(self):
+        """A file that holds no marks tells by its white level what the charge of a full photosite reads, less the level of any row."""
+        shape, border = (200, 120), 20
+        sensor = ["schema: cyanometer-sensor/2", "name: own", "readout:", f"  width: {shape[1]}", f"  height: {shape[0]}"]
+        sensor += ["  pixel_pitch_um: 5", "  cfa: rggb", "  full_well_e: 60000", "  dark_current_e_per_s: 0", "  temperature_k: 293"]
+        sensor += ["  dcnu: 0", "  prnu: 0", "  read_noise_e: 10", "  row_noise_e: 200", "  bits: 16", "  bias_adu: 500", "  adu_per_e: 0.5"]
+        (self.directory / "own.yaml").write_text("\n".join(sensor) + "\n")
+        lit = np.full(shape, 50000.0)
+        lit[:, 70:] = 90000
+        lit[:, :border] = 0
+        charge = np.minimum(self.chance.poisson(lit), 60000) + self.chance.normal(0, 200, (shape[0], 1))
+        codes = (500 + 0.5 * (charge + self.chance.normal(0, 10, shape))).round()
+        codes.astype("<u2").tofile(self.directory / "light.raw")
+        head = ["schema: cyanometer/1", "quantity: adu", "cfa: rggb", f"masked_areas: [[0, 0, {border}, {shape[0]}]]"]
+        (self.directory / "light.raw.yaml").write_text("\n".join(head) + "\n")
+        how = ["--raw", f"{shape[1]}x{shape[0]}:u16le", "--sensor", "own.yaml", "--white", "65000", "--black", "rows"]
+        self.run_program(["correct-frame", "-q", "light.raw", *how, "-o", "light.dng"])
+        (self.directory / "light.dng.yaml").unlink(missing_ok=True)
+        marks = self.frame(["demosaic", "-q", "light.dng"])["mask"].astype(int) & 1
+        self.assertEqual((marks[:, 24:64].sum(), marks[:, 72:].sum()), (0, marks[:, 72:].size))
+
     def test_copies_are_refused(self):
         self.codes("light.raw", 3000, 50)
         self.many("dark", 3, 500, 12)

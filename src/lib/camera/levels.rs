@@ -136,6 +136,18 @@ impl WhiteLevel {
         self.classes().into_iter().fold(f64::INFINITY, f64::min) - black
     }
 
+    /// The lower of two, class by class.
+    #[must_use]
+    pub fn lower(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Uniform(one), Self::Uniform(other)) => Self::Uniform(one.min(other)),
+            (one, other) => {
+                let [one, other] = [one, other].map(Self::classes);
+                Self::Classes([0, 1, 2].map(|k| one[k].min(other[k])))
+            }
+        }
+    }
+
     /// What is left of it once `blacks` of R, G and B are subtracted.
     #[must_use]
     pub fn less(self, blacks: [f64; 3]) -> Self {

@@ -66,12 +66,14 @@ pub struct Photosite {
     pub flat: Option<Flat>,
     /// Which equations to predict by.
     pub equations: Equations,
+    /// Whether so few photosites are such that it does not matter where in a code full well lies.
+    pub is_rare: bool,
 }
 
 impl Photosite {
     /// A photosite in electrons.
     pub fn of_electrons(model: NoiseModel, equations: Equations) -> Self {
-        Self { model, adc: None, darks: [None; MOST_DARKS], flat: None, equations }
+        Self { model, adc: None, darks: [None; MOST_DARKS], flat: None, equations, is_rare: false }
     }
 
     /// The same as the converter reads it.
@@ -155,7 +157,8 @@ impl Photosite {
         let law = Law::of(&self.model, expected_e);
         let is_paper = self.equations == Equations::Paper;
         if !is_paper && !law.is_plain(adc) {
-            return law.predict(&law.of_codes(adc, codes_of(adc)));
+            let reading = law.of_codes(adc, codes_of(adc));
+            return law.predict(&if self.is_rare { reading.coarse() } else { reading });
         }
         let (before, slope) = (self.electrons(expected_e), adc.adu_per_e);
         let [of_variance, of_fourth] = if is_paper { [0.0; 2] } else { [1.0 / 12.0, -1.0 / 120.0] };

@@ -301,13 +301,15 @@ fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
         Some(noise) => noise.clone(),
         None => whole_noise(frame)?,
     };
-    let model = less_border(frame, NoiseModel::of(frame, &noise)?);
+    let model = NoiseModel::of(frame, &noise)?;
     let photosite = Photosite::of_electrons(model, Equations::Exact);
     let found = match metadata.quantity {
         QuantityKind::Electrons | QuantityKind::ExpectedElectrons => (photosite, metadata.dark_signal_e.unwrap_or(0.0)),
         _ => {
             let adc = metadata.adc.unwrap_or_else(|| AdcRecord::of_readout(readout));
             let codes = corrected(frame, photosite.digitized(adc)).map_err(|why| frame.refuse(why.to_string()))?;
+            // Frames that came off, or divide it, keep what their rows and columns have.
+            let codes = Photosite { model: less_border(frame, codes.model), ..codes };
             let black_adu = frame.uniform_black_adu()?;
             (codes, black_adu + dark_above(frame, &codes, &adc, black_adu))
         }

@@ -19,6 +19,8 @@ pub(super) struct Reading {
     pub center: f64,
     /// What is added to every charge, e⁻.
     pub offset_e: f64,
+    /// Read noise in codes from which rounding is a uniform error.
+    pub smooth_from: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,23 +44,28 @@ pub(super) const ENDLESS: Rounding = Rounding { lowest: f64::NEG_INFINITY, highe
 impl Reading {
     /// Electrons about a charge.
     pub fn electrons(noise_e: f64, center: f64) -> Self {
-        Self { asked: Asked::Electrons, noise_e, center, offset_e: 0.0 }
+        Self { asked: Asked::Electrons, noise_e, center, offset_e: 0.0, smooth_from: SMOOTH }
     }
 
     /// Codes between ends, about the code of a charge.
     pub fn codes(adc: AdcRecord, ends: Rounding, noise_e: f64, about_e: f64) -> Self {
         let center = adc.sample(ends.code(adc.level_at(about_e)));
-        Self { asked: Asked::Codes(adc, ends), noise_e, center, offset_e: 0.0 }
+        Self { asked: Asked::Codes(adc, ends), noise_e, center, offset_e: 0.0, smooth_from: SMOOTH }
     }
 
     /// Whether a charge and read noise exceed a level.
     pub fn beyond(noise_e: f64, level_e: f64) -> Self {
-        Self { asked: Asked::Beyond(level_e), noise_e, center: 0.0, offset_e: 0.0 }
+        Self { asked: Asked::Beyond(level_e), noise_e, center: 0.0, offset_e: 0.0, smooth_from: SMOOTH }
     }
 
     /// The same of charges that are off by so many electrons more.
     pub fn off_by(&self, offset_e: f64) -> Self {
         Self { offset_e: self.offset_e + offset_e, ..*self }
+    }
+
+    /// The same of so few that rounding may be a uniform error where nothing ends, whatever the noise.
+    pub fn coarse(&self) -> Self {
+        Self { smooth_from: 0.0, ..*self }
     }
 
     /// Whether what is asked are codes that are not straight.
@@ -177,7 +184,7 @@ impl Reading {
             }
         };
         match self.asked {
-            Asked::Codes(adc, _) if self.noise_e < SMOOTH * width(&adc) => Some(width(&adc)),
+            Asked::Codes(adc, _) if self.noise_e < self.smooth_from * width(&adc) => Some(width(&adc)),
             _ => None,
         }
     }

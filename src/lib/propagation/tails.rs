@@ -159,6 +159,7 @@ impl Photosite {
         let of_hot =
             kinds.iter().zip(&jumps_show).skip(1).filter(|(_, show)| **show).map(|((_, weight), _)| weight / sum);
         let matter_if_hot = self.jumps_matter(expected_e, trap_share * of_hot.sum::<f64>());
+        let variance = self.at(&State { hot: 0.0, trap: 0.0 }).moments(expected_e).moments.variance;
         let mut found = Vec::new();
         let mut foreseen = effort::Foreseen::of(kinds.len() - 1);
         // Most photosites first, then hot ones from all over, which tell early how much work all are.
@@ -171,7 +172,7 @@ impl Photosite {
             if effort::is_spent() {
                 break;
             }
-            let quiet = self.at(&State { hot, trap: 0.0 });
+            let quiet = Self { is_rare: self.is_rare_if(hot, weight, variance), ..self.at(&State { hot, trap: 0.0 }) };
             let jumps_apart = (hot == 0.0 || matter_if_hot) && jumps_show[index];
             let is_free = trap_share > 0.0 && !jumps_apart;
             let share = if jumps_apart { 1.0 - trap_share } else { 1.0 };
@@ -217,6 +218,17 @@ impl Photosite {
         let is_little = share * amplitude * amplitude <= NEGLIGIBLE * others.variance
             && 0.25 * share * amplitude <= NEGLIGIBLE * others.std();
         !is_little
+    }
+
+    /// Whether so few photosites have such an excess of dark current that how codes are rounded where they end does not show in a variance.
+    ///
+    /// 2 w d e^(−2π²σ²) ≤ 10⁻¹⁰ V        w their share, d how far off they are and σ what blurs them, in codes, V the variance of most
+    fn is_rare_if(&self, hot: f64, weight: f64, variance: f64) -> bool {
+        const NEGLIGIBLE: f64 = 1e-10;
+        let Some(adc) = self.adc.filter(|_| hot > 0.0) else { return false };
+        let [off, blur] = [hot * self.most(|tails| tails.hot_e), self.model.added()].map(|e| adc.adu_per_e * e);
+        let ripple = libm::exp(-2.0 * (std::f64::consts::PI * blur).powi(2));
+        2.0 * weight * (off + 1.0) * ripple <= NEGLIGIBLE * variance
     }
 
     /// Cumulants 2, 4 and 6 of what jumps add to samples, those of averages that came off included: given its amplitude a, what is

@@ -85,6 +85,11 @@ impl Exposures {
             };
             self.unlike = Some(differs);
         }
+        // What is full in any is full in the average.
+        let whites = [&self.first, frame].map(|frame| frame.metadata.white_level_adu);
+        if let [Some(white), Some(other)] = whites {
+            self.first.metadata.white_level_adu = Some(white.lower(other));
+        }
         let spilled = &mut self.first.metadata.bloomed_photosites;
         *spilled = (*spilled).max(frame.metadata.bloomed_photosites);
         Ok(())
@@ -143,13 +148,14 @@ fn without_border(frame: &FrameHeader) -> FrameHeader {
         // By which lines it was told is the same of all.
         *noise = noise.signs();
         correction.black_adu = 0.0.into();
+        head.metadata.white_level_adu = None;
     }
     head
 }
 
 /// What is known of the camera and of how it was set, and nothing else.
 fn camera(frame: &FrameHeader) -> Metadata {
-    let known = frame.without_exposure().metadata;
+    let known = without_border(frame).metadata;
     Metadata {
         sensor: known.sensor,
         camera: known.camera,
