@@ -5,7 +5,7 @@ use super::law::Law;
 use super::masters::{Dark, Flat, MOST_DARKS};
 use super::moments::{Equations, Prediction};
 use super::pattern::{Seen, Shared};
-use super::reading::codes_of;
+use super::reading::{Reading, codes_of};
 use crate::metadata::{AdcRecord, PoissonKind};
 use crate::numerics::averages::Combine;
 use crate::stages::noise::NoiseModel;
@@ -157,8 +157,7 @@ impl Photosite {
         let law = Law::of(&self.model, expected_e);
         let is_paper = self.equations == Equations::Paper;
         if !is_paper && !law.is_plain(adc) {
-            let reading = law.of_codes(adc, codes_of(adc));
-            return law.predict(&if self.is_rare { reading.coarse() } else { reading });
+            return law.predict(&self.reading(&law, adc));
         }
         let (before, slope) = (self.electrons(expected_e), adc.adu_per_e);
         let [of_variance, of_fourth] = if is_paper { [0.0; 2] } else { [1.0 / 12.0, -1.0 / 120.0] };
@@ -168,6 +167,11 @@ impl Photosite {
             before.third * slope.powi(3),
             before.fourth() * slope.powi(4) + of_fourth,
         )
+    }
+
+    fn reading(&self, law: &Law, adc: &AdcRecord) -> Reading {
+        let reading = law.of_codes(adc, codes_of(adc));
+        if self.is_rare { reading.coarse() } else { reading }
     }
 
     /// After averages of dark frames of the same sensor were subtracted, each times its weight w:
@@ -274,13 +278,15 @@ impl Photosite {
             let shared = Shared { light: light + own, dark: of_dark, both: (own * of_dark).sqrt(), median: None };
             return self.with_offsets(shared, dark, [adc.adu_per_e; 2]);
         }
-        let seen = |law: Law, median_of| Seen { law, reading: law.of_codes(adc, codes_of(adc)), median_of, is_fine };
+        let seen = |law: Law, median_of| Seen { law, reading: self.reading(&law, adc), median_of, is_fine };
         let shared = Shared::of(seen(law, median_of), seen(of_dark, dark_median_of));
         if self.model.offsets() == 0.0 && dark.model.offsets() == 0.0 {
             return shared;
         }
         let medians = [median_of, dark_median_of];
-        if let Some(exact) = self.shared_over_offsets(adc, [law, of_dark], (dark, medians), is_fine) {
+        if !self.is_rare
+            && let Some(exact) = self.shared_over_offsets(adc, [law, of_dark], (dark, medians), is_fine)
+        {
             return exact;
         }
         self.with_offsets(shared, dark, [law.mean_slope(adc), of_dark.mean_slope(adc)])

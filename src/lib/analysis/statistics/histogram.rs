@@ -34,30 +34,50 @@ impl Histogram {
         }
     }
 
-    /// Takes in finite samples; the first tell the width of bins, which doubles when they become too many.
+    /// Takes in finite samples; the first that differ tell the width of bins, which doubles when they become too many.
     pub(super) fn add(&mut self, samples: impl Iterator<Item = f64> + Clone) {
-        if self.width == 0.0 {
-            let mut sorted: Vec<f64> = samples.clone().collect();
-            sorted.sort_by(f64::total_cmp);
-            let ([low, .., high] | [low @ high]) = sorted.as_slice() else { return };
-            // One sample far off makes no bins in which all others are one.
-            let sixth = sorted.len() / 6;
-            let middle = sorted[sorted.len() - 1 - sixth] - sorted[sixth];
-            let spread = if middle > 0.0 { middle } else { high - low };
-            // A power of two, so that halves of bins meet exactly; at least what a sample can tell.
-            let largest = sorted[sixth].abs().max(sorted[sorted.len() - 1 - sixth].abs());
-            let finest = (largest * f64::from(f32::EPSILON)).max(f64::from(f32::MIN_POSITIVE));
-            self.width = (spread / FINEST).max(finest).log2().floor().exp2();
+        let is_of_codes = self.shift != 0.0;
+        // Samples that are all the same tell no width.
+        if !is_of_codes && self.ends[0] >= self.ends[1] {
+            self.begin_with(samples.clone());
+        }
+        // One sample far off makes no bins in which all others are one; many do.
+        let beyond = |width: f64| samples.clone().filter(|sample| sample.abs() > FARTHEST_BIN * width).count() as u64;
+        while beyond(self.width) > (self.total() + samples.clone().count() as u64) / 6 {
+            *self = self.merged(2);
         }
         for sample in samples {
             self.ends = [self.ends[0].min(sample), self.ends[1].max(sample)];
-            #[expect(clippy::cast_possible_truncation, reason = "a bin that is no farther than doubles count")]
-            let bin = (sample / self.width - self.shift).floor().clamp(-FARTHEST_BIN, FARTHEST_BIN) as i64;
-            *self.counts.entry(bin).or_default() += 1;
+            *self.counts.entry(self.bin(sample)).or_default() += 1;
             while self.counts.len() > MOST_BINS {
                 *self = self.merged(2);
             }
         }
+    }
+
+    /// Sets the width by the first samples, those before being none or all the same.
+    fn begin_with(&mut self, samples: impl Iterator<Item = f64>) {
+        let before = (self.total(), self.ends[0]);
+        let mut sorted: Vec<f64> = samples.chain((before.0 > 0).then_some(before.1)).collect();
+        sorted.sort_by(f64::total_cmp);
+        let ([low, .., high] | [low @ high]) = sorted.as_slice() else { return };
+        // One sample far off makes no bins in which all others are one.
+        let sixth = sorted.len() / 6;
+        let middle = sorted[sorted.len() - 1 - sixth] - sorted[sixth];
+        let spread = if middle > 0.0 { middle } else { high - low };
+        // A power of two, so that halves of bins meet exactly; at least what a sample can tell.
+        let largest = sorted[sixth].abs().max(sorted[sorted.len() - 1 - sixth].abs());
+        let finest = (largest * f64::from(f32::EPSILON)).max(f64::from(f32::MIN_POSITIVE));
+        self.width = (spread / FINEST).max(finest).log2().floor().exp2();
+        self.counts.clear();
+        if before.0 > 0 {
+            self.counts.insert(self.bin(before.1), before.0);
+        }
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "a bin that is no farther than doubles count")]
+    fn bin(&self, sample: f64) -> i64 {
+        (sample / self.width - self.shift).floor().clamp(-FARTHEST_BIN, FARTHEST_BIN) as i64
     }
 
     /// The same with bins so many times as wide.
@@ -119,6 +139,15 @@ mod tests {
             let [low, high] = histogram.middle(0.005).unwrap();
             assert!((5.0 - low).abs() <= 1.0 + histogram.width && (994.0 - high).abs() <= 1.0 + histogram.width);
             assert_eq!(histogram.ends, [far.min(1.0), far.max(999.0)]);
+        }
+        // Rows that are all the same, or next to it, come first.
+        for first in [vec![0.0; 40], vec![3.0; 40], [vec![0.0; 39], vec![1e-30]].concat(), vec![1e-35, 2e-35, 3e-35]] {
+            let mut late = histogram(&first);
+            late.add(samples[1..999].iter().copied());
+            assert!(late.width <= 16.0 && late.counts.len() > 60, "{first:?}: {} {}", late.width, late.counts.len());
+            assert_eq!(late.total(), first.len() as u64 + 998);
+            let [_, high] = late.middle(0.005).unwrap();
+            assert!((993.0 - high).abs() <= 2.0 + late.width, "{first:?}: {high}");
         }
         let few = histogram(&[1.0, 2.0, 3.0, 100.0]);
         let [low, high] = few.middle(0.005).unwrap();
