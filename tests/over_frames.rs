@@ -681,6 +681,28 @@ fn averages_of_few_codes_are_void_where_they_are_not_known() {
     assert!(refused.contains("clipped mean leaves out"), "{refused}");
 }
 
+/// At an end of the codes what is drawn anew hangs on the offset of a column, which all its photosites have: the scatter of variances is
+/// not that of photosites apart, and nothing is judged by it. Offsets of photosites are, and those of columns where nothing ends.
+#[test]
+fn what_differs_from_line_to_line_is_not_judged() {
+    let with = |bias_adu: f64, set: fn(&mut ReadOut)| {
+        let mut camera = Camera::random(5, [60, 50]);
+        let readout = &mut camera.readout;
+        plain(readout, [10.0, 0.1, 0.005, 10.0, 0.25]);
+        (readout.row_noise_e, readout.column_noise_e) = (0.0, 0.0);
+        (readout.dsnu_e, readout.dsnu_row_e, readout.dsnu_column_e) = (0.0, 0.0, 0.0);
+        (readout.prnu_row, readout.prnu_column, readout.bias_adu) = (0.0, 0.0, bias_adu);
+        set(readout);
+        let frames: Vec<MemoryFrame> = (0..5).map(|frame| camera.plane([0.0; 3], frame)).collect();
+        over_frames(&frames, Some(1e-4)).map(|(report, _)| report.regions[0].tests.len())
+    };
+    let of_columns = |readout: &mut ReadOut| readout.dsnu_column_e = 9.0;
+    let of_photosites = |readout: &mut ReadOut| readout.dsnu_e = 9.0;
+    assert!(with(600.0, of_columns).unwrap() > 0 && with(0.0, of_photosites).unwrap() > 0);
+    let refused = with(0.0, of_columns).unwrap_err().to_string();
+    assert!(refused.contains("rows or columns have fixed offsets or gains"), "{refused}");
+}
+
 /// What cannot be checked is told by its reason.
 #[test]
 fn what_cannot_be_checked_is_told() {

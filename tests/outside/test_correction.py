@@ -287,6 +287,26 @@ class Correction(ProgramCase):
         self.assertLessEqual(len(places), 5)
         self.assertEqual(light.shape, found["Y"].shape)
 
+    def test_quiet_codes_make_no_defects(self):
+        """Noise below half a code about a mean between two codes, or at an end of them, marks nothing; a photosite that jumps is found."""
+        jumps = np.zeros(SHAPE, bool)
+        jumps[5, 7] = jumps[16, 30] = True
+        for mean, std, steps in ((100.45, 0.4, 1), (100.5, 0.3, 16), (100.0, 0.35, 1), (0.0, 0.8, 1), (-0.4, 2.0, 1)):
+            names = []
+            offsets = mean + self.chance.normal(0, 0.1, SHAPE)
+            for index in range(16):
+                levels = offsets + self.chance.normal(0, std, SHAPE) + np.where(jumps, self.chance.choice([0, 12], SHAPE), 0)
+                (levels.round().clip(0, 4000) * steps).astype("<u2").tofile(self.directory / f"dark{index}.raw")
+                head = ["schema: cyanometer/1", "quantity: adu", "cfa: rggb"]
+                (self.directory / f"dark{index}.raw.yaml").write_text("\n".join(head) + "\n")
+                names.append(f"dark{index}.raw")
+            self.codes("light.raw", 3000, 50)
+            words = [*self.options("--dark", names), "--find-defects"]
+            marks = self.correct(*words)["mask"].astype(int) != 0
+            with self.subTest(mean=mean, std=std, steps=steps):
+                self.assertTrue(marks[jumps].all())
+                self.assertLessEqual(np.count_nonzero(marks & ~jumps), 1)
+
     def test_any_number_of_frames(self):
         light = self.codes("light.raw", 3000, 50)
         names, darks = self.many("dark", 2000, 500, 12)

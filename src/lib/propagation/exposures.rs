@@ -1,10 +1,13 @@
 //! What is predicted of several exposures of one scene: of their means, and of what is drawn anew in each.
 
 use super::frame::{FramePrediction, Sites};
+use super::lines::Axis;
 use super::moments::{Equations, Prediction};
+use super::photosite::Photosite;
 use super::repeated::is_linear;
 use super::unpredictable::{Predicted, Unpredictable};
-use crate::metadata::{AverageRecord, FrameHeader};
+use crate::frame::Geometry;
+use crate::metadata::{AdcRecord, AverageRecord, FrameHeader};
 use crate::numerics::averages::Combine;
 
 /// Why nothing is said of exposures of what is curved.
@@ -16,6 +19,10 @@ const AVERAGES: &str = "the frames are averages themselves";
 
 /// Why the scatter of statistics over frames is not known.
 const UNLIKE: &str = "how statistics over frames scatter is not predicted of hot pixels and random telegraph signals";
+
+/// Why the scatter of statistics over frames is not known where what is drawn anew differs from line to line.
+const BY_LINES: &str = "rows or columns have fixed offsets or gains, and what is drawn anew hangs on these: shot noise on gains, and what an end \
+                        of the codes or their steps leave on offsets; how far statistics over frames scatter by that is not predicted";
 
 /// What is predicted of exposures of one scene.
 pub struct Repeated {
@@ -44,11 +51,57 @@ impl Repeated {
         let temporal = sites.photosite.temporal_of(sites.expected_e)?;
         let mean = AverageRecord { frames, combine: Combine::Mean, clip: None };
         let of = |moments: [Prediction; 3]| Sites { moments, ..sites.clone() }.frame(frame);
+        let hang_on_lines = sites.photosite.hangs_on_lines(sites.expected_e, &frame.geometry, frames);
         let has_tails = temporal.iter().any(|temporal| temporal.unlike.is_none());
         Ok(Self {
             means: of([0, 1, 2].map(|k| temporal[k].averaged(&sites.moments[k], &mean)))?,
             variances: of(temporal.map(|temporal| temporal.of_variances(frames)))?,
-            scatter: if has_tails { Err(Unpredictable::Beyond(UNLIKE)) } else { Ok(()) },
+            scatter: match (has_tails, hang_on_lines) {
+                (true, _) => Err(Unpredictable::Beyond(UNLIKE)),
+                (_, true) => Err(Unpredictable::Beyond(BY_LINES)),
+                _ => Ok(()),
+            },
         })
+    }
+}
+
+impl Photosite {
+    /// Whether what is drawn anew hangs so much on what rows or columns have for good that means over them scatter by it, beside what
+    /// N frames leave to chance: more than 3 % of its standard deviation.
+    ///
+    /// n (v(u) − v)² > 0.06 · 2 v²/(N − 1)        v the variance over exposures, u the rms of what a line has, n photosites of a line
+    fn hangs_on_lines(&self, expected_e: [f64; 3], geometry: &Geometry, frames: u32) -> bool {
+        const NEGLIGIBLE: f64 = 0.06;
+        let Some(adc) = self.adc.filter(|_| !self.has_tails() && self.flat.is_none()) else { return false };
+        let mut fixed = self.model;
+        for line in [&mut fixed.lines.dsnu_row_e, &mut fixed.lines.dsnu_column_e] {
+            *line = 0.0;
+        }
+        (fixed.lines.prnu_row, fixed.lines.prnu_column) = (0.0, 0.0);
+        let of = |class: usize, offset_e: f64, gain: f64| {
+            let adc = AdcRecord { bias_adu: adc.bias_adu + adc.adu_per_e * offset_e, ..adc };
+            let site = Self { model: fixed, adc: Some(adc), ..*self };
+            site.temporal(class, gain * expected_e[class], false).variance
+        };
+        let shows = |axis: Axis| {
+            let [_, offset_e, response] = axis.parts(&self.model.lines);
+            if offset_e == 0.0 && response == 0.0 {
+                return false;
+            }
+            // Every other photosite of a line is of a class.
+            let along = match axis {
+                Axis::Row => geometry.width,
+                Axis::Column => geometry.height,
+            };
+            (0..3).any(|class| {
+                let own = of(class, 0.0, 1.0);
+                let chance = 2.0 * own * own / f64::from(frames.max(2) - 1);
+                [1.0, -1.0].into_iter().any(|sign| {
+                    let off = of(class, sign * offset_e, 1.0 + sign * response) - own;
+                    0.5 * along as f64 * off * off > NEGLIGIBLE * chance
+                })
+            })
+        };
+        Axis::ALL.into_iter().any(shows)
     }
 }

@@ -123,7 +123,7 @@ impl Photosite {
 
     /// What is drawn anew in each exposure at photosites of the class R, G or B, what rows and columns share apart; where it is asked,
     /// how photosites differ.
-    fn temporal(&self, class: usize, expected_e: f64, is_told: bool) -> Temporal {
+    pub(super) fn temporal(&self, class: usize, expected_e: f64, is_told: bool) -> Temporal {
         if let Some((_, found)) = self.flat.and_then(|_| self.divided_over(class, expected_e)) {
             return found;
         }

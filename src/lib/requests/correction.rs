@@ -366,7 +366,7 @@ impl Correction {
             warnings.extend(doubt_of_flats(means));
             warnings.extend(means.doubt.clone());
         }
-        warnings.extend(beyond.and_then(doubt_of_limits));
+        warnings.extend(self.find_defects.flatten().and_then(doubt_of_limits));
         let sources =
             darks.iter().flat_map(DarkFrames::frames).chain(flats.iter().flat_map(|(flats, _)| flats.frames()));
         let mut remarks: Vec<String> = sources.flat_map(|source| source.notes().to_vec()).collect();

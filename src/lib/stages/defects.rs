@@ -237,35 +237,54 @@ impl Survey {
     }
 
     /// Lower and upper limits of each class, so many standard deviations off; these are at least `least`.
+    ///
+    /// Of samples that an end cuts off below, such as codes at 0, the upper half tells where they would lie.
     pub fn limits(self, beyond: f64, least: f64) -> Vec<[f64; 2]> {
         let limits = |mut values: Vec<f32>| {
             if values.is_empty() {
                 return [f64::NEG_INFINITY, f64::INFINITY];
             }
-            let [center, _] = grouped_median(&mut values);
+            values.sort_unstable_by(f32::total_cmp);
+            let [center, _] = grouped_quantile(&values, 0.5);
             let mut off: Vec<f32> = values.iter().map(|value| to_sample((f64::from(*value) - center).abs())).collect();
-            let [deviation, step] = grouped_median(&mut off);
+            off.sort_unstable_by(f32::total_cmp);
+            let [deviation, step] = grouped_quantile(&off, 0.5);
             // What is rounded may lie half a step farther off.
             let reach = beyond * (deviation / NORMAL_MEDIAN).max(least) + 0.5 * step;
-            [center - reach, center + reach]
+            let high = if is_cut_off(&values) {
+                let [[one, _], [two, step]] = [1.0, 2.0].map(|z| grouped_quantile(&values, cumulative(z)));
+                let std = (two - one).max(least);
+                one - std + beyond * std + 0.5 * step
+            } else {
+                f64::NEG_INFINITY
+            };
+            [center - reach, high.max(center + reach)]
         };
         self.classes.into_iter().map(limits).collect()
     }
 }
 
-/// The median of samples, and the step from it to the next larger one. Equal ones, such as codes, count as spread evenly over
+/// Whether so many of sorted samples are the lowest that an end may be what makes them so.
+fn is_cut_off(values: &[f32]) -> bool {
+    const SHARE: f64 = 0.2;
+    let at_end = values.partition_point(|value| *value <= values[0]);
+    at_end as f64 > SHARE * values.len() as f64
+}
+
+/// A quantile of sorted samples, and the step from it to the next larger one. Equal ones, such as codes, count as spread evenly over
 /// half the way to their neighbors on either side.
-fn grouped_median(values: &mut [f32]) -> [f64; 2] {
-    values.sort_unstable_by(f32::total_cmp);
-    let middle = values[values.len() / 2];
+fn grouped_quantile(values: &[f32], share: f64) -> [f64; 2] {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the samples")]
+    let place = ((share * values.len() as f64) as usize).min(values.len() - 1);
+    let middle = values[place];
     let below = values.partition_point(|value| *value < middle);
     let upto = values.partition_point(|value| *value <= middle);
     let at =
         |index: Option<usize>| index.and_then(|index| values.get(index)).map_or(f64::from(middle), |v| f64::from(*v));
     let [low, center, high] = [at(below.checked_sub(1)), f64::from(middle), at(Some(upto))];
     let [from, to] = [f64::midpoint(low, center), f64::midpoint(center, high)];
-    let share = (0.5 * values.len() as f64 - below as f64) / (upto - below) as f64;
-    [from + (to - from) * share, high - center]
+    let within = (share * values.len() as f64 - below as f64) / (upto - below) as f64;
+    [from + (to - from) * within, high - center]
 }
 
 /// Interpolates photosites that are marked as defective from good ones of their class, and marks them as corrected.
@@ -385,6 +404,23 @@ mod tests {
                 assert!(found <= 1, "{sigma} {mean}: {found} beyond {low} {high}");
                 // Nor are they so wide that a defect of twice the noise's reach, and two codes, is missed.
                 assert!(high - mean < 2.0 * 6.0 * f64::max(sigma, 0.25) + 2.0, "{sigma} {mean}: {high}");
+            }
+        }
+    }
+
+    /// Most of a class at code 0, where its mean lies below: those above tell how far the others would lie.
+    #[test]
+    fn samples_that_an_end_cuts_off_make_no_defects() {
+        const COUNT: u64 = 30_000;
+        for sigma in [0.6, 2.11, 30.0] {
+            for below in [0.0, 0.5, 1.0] {
+                let normal = |i: u64| quantile(u64::MAX / COUNT * i + u64::MAX / COUNT / 2);
+                let code = |i: u64| (sigma * (normal(i) - below)).round().max(0.0);
+                let mut survey = Survey::new(1, 30_000);
+                (0..COUNT).for_each(|i| survey.take(0, code(i)));
+                let [_, high] = survey.limits(beyond_chance(COUNT), 0.25)[0];
+                let found = (0..COUNT).filter(|i| code(*i) > high).count();
+                assert!(found <= 1 && high < 2.0 * 6.0 * sigma + 2.0, "{sigma} {below}: {found} beyond {high}");
             }
         }
     }
