@@ -94,9 +94,12 @@ impl Law {
 
     /// Whether full well, or sensitivities of zero, cut the charge off.
     pub fn is_cut(&self) -> bool {
-        self.reaches_full_well()
-            || self.light.is_rectified(self.full_well_e)
-            || self.dark.is_rectified(self.full_well_e)
+        self.reaches_full_well() || self.is_rectified()
+    }
+
+    /// Whether sensitivities of zero do.
+    pub fn is_rectified(&self) -> bool {
+        self.light.is_rectified(self.full_well_e) || self.dark.is_rectified(self.full_well_e)
     }
 
     /// The standard deviation, in e⁻, of a normal error that would leave of no ripple more than 1/m of what charge and read noise leave
@@ -325,12 +328,16 @@ impl Law {
         (above - below) / (2.0 * step)
     }
 
-    /// The variance that codes without ends would have; none where the ends are out of reach.
-    pub fn endless_variance(&self, adc: &AdcRecord) -> Option<f64> {
+    /// Whether no end of the codes is within reach of what is read, full photosites included.
+    pub fn is_read_within(&self, adc: &AdcRecord) -> bool {
         let [low, high] = self.reach();
         let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
-        let is_within = lower < low && upper > high.min(self.full_well_e + REACH * self.read_noise_e + self.trap_e);
-        (!is_within).then(|| self.predict(&self.of_codes(adc, ENDLESS)).moments.variance)
+        lower < low && upper > high.min(self.full_well_e + REACH * self.read_noise_e + self.trap_e)
+    }
+
+    /// The variance that codes without ends would have; none where the ends are out of reach.
+    pub fn endless_variance(&self, adc: &AdcRecord) -> Option<f64> {
+        (!self.is_read_within(adc)).then(|| self.predict(&self.of_codes(adc, ENDLESS)).moments.variance)
     }
 
     /// The least and the largest charge, full well apart.

@@ -79,7 +79,7 @@ impl LevelVariance {
                 return photosite.variance_divided(class, expected_e);
             }
             if photosite.has_tails() {
-                return photosite.moments(expected_e).moments.variance;
+                return photosite.variance_by_few(expected_e);
             }
             let Some(adc) = photosite.adc else { return photosite.moments(expected_e).moments.variance };
             if photosite.darks[0].is_some() {

@@ -23,6 +23,7 @@
 //! The covariance matrix of all photosites of a frame is then block plus low rank: D + Σ_rows Z R Zᵀ + Σ_columns Z S Zᵀ, Z
 //! telling the classes, D diagonal with the variance of each less R_kk + S_kk.
 
+use super::charge::charge;
 use super::curved::NODES;
 
 use super::law::Law;
@@ -294,7 +295,8 @@ impl Photosite {
         let is_corrected = self.darks[0].is_some() || self.flat.is_some();
         let own = own(&self.model);
         let laws = expected_e.map(|expected_e| Law::of(&self.model, expected_e));
-        let is_cut = laws.iter().any(|law| law.is_cut());
+        let is_cut =
+            laws.iter().zip(expected_e).any(|(law, expected_e)| law.is_rectified() || self.nears_full_well(expected_e));
         let blur = |adc: &AdcRecord| {
             let of_class = |expected_e: f64| adc.adu_per_e * blur_e(&own, adc, expected_e);
             expected_e.into_iter().map(of_class).fold(f64::INFINITY, f64::min)
@@ -319,6 +321,15 @@ impl Photosite {
             }
             _ => Err(Unpredictable::Beyond(WITH_LINES)),
         }
+    }
+
+    /// Whether so many photosites are full that what they share is told by fewer: one in 10¹³ or more.
+    fn nears_full_well(&self, expected_e: f64) -> bool {
+        const DEVIATIONS: f64 = 7.5;
+        // Counts are skewed: so many more are as rare.
+        const SKEWED_E: f64 = 30.0;
+        let charge = charge(&self.model, expected_e);
+        charge.mean + DEVIATIONS * charge.variance.max(0.0).sqrt() + SKEWED_E >= self.model.full_well_e
     }
 
     /// R of the straight codes, of such slopes to the charge.

@@ -289,7 +289,12 @@ impl Photosite {
         {
             return exact;
         }
-        self.with_offsets(shared, dark, [law.mean_slope(adc), of_dark.mean_slope(adc)])
+        // Of few, how codes are rounded does not matter, and what is added to full ones is read as to others.
+        let slope = |law: &Law| match self.is_rare && !adc.is_bent() && law.is_read_within(adc) {
+            true => adc.adu_per_e,
+            false => law.mean_slope(adc),
+        };
+        self.with_offsets(shared, dark, [slope(&law), slope(&of_dark)])
     }
 
     /// The same with the fixed offsets of photosites, which codes follow with such slopes.

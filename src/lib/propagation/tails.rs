@@ -137,12 +137,8 @@ impl Photosite {
         self.models().map(|model| of(&model.tails)).fold(0.0, f64::max)
     }
 
-    /// What holds for each kind of photosites: those that jump apart only where jumps show how codes are rounded, or end.
-    fn each<T>(&self, expected_e: f64, of: impl Fn(&Self) -> T) -> Vec<Kind<T>> {
-        self.each_of(expected_e, true, of)
-    }
-
-    /// The same; where the rounding of codes shows, all amplitudes that tell it, or few.
+    /// What holds for each kind of photosites: those that jump apart only where jumps show how codes are rounded, or end; where the rounding
+    /// of codes shows, all amplitudes that tell it, or few.
     fn each_of<T>(&self, expected_e: f64, is_fine: bool, of: impl Fn(&Self) -> T) -> Vec<Kind<T>> {
         let [hot_share, trap_share] = [self.most(|tails| tails.hot_share), self.most(|tails| tails.rts_share)];
         let mut kinds = vec![(0.0, 1.0 - hot_share)];
@@ -339,10 +335,17 @@ impl Photosite {
     /// No numbers where it takes too long.
     fn work_out(&self, expected_e: f64) -> (Prediction, f64) {
         let none = Prediction::of_cumulants(f64::NAN, f64::NAN, f64::NAN, f64::NAN);
-        effort::within(MOST_WORK, || self.mixture_of_kinds(expected_e)).unwrap_or((none, f64::NAN))
+        effort::within(MOST_WORK, || self.mixture_of_kinds(expected_e, true)).unwrap_or((none, f64::NAN))
     }
 
-    fn mixture_of_kinds(&self, expected_e: f64) -> (Prediction, f64) {
+    /// The variance of all together by few amplitudes, which tell it where the rounding of codes does not show; no number where it takes
+    /// too long.
+    pub(super) fn variance_by_few(&self, expected_e: f64) -> f64 {
+        let variance = || self.mixture_of_kinds(expected_e, false).0.moments.variance;
+        effort::within(MOST_WORK, variance).unwrap_or(f64::NAN)
+    }
+
+    fn mixture_of_kinds(&self, expected_e: f64, is_fine: bool) -> (Prediction, f64) {
         let [second, fourth, sixth] = self.jump_cumulants();
         let with_jumps = |kind: Kind<Prediction>| {
             let Kind { weight, is_free, value } = kind;
@@ -353,7 +356,7 @@ impl Photosite {
             let with = Prediction::of_cumulants(value.moments.mean, variance, value.third, of_fourth);
             (weight, Prediction { sixth: value.sixth + sixth, ..with })
         };
-        let kinds = self.each(expected_e, |site| {
+        let kinds = self.each_of(expected_e, is_fine, |site| {
             // Sixth cumulant of −a, 0 or a.
             let trap = 0.5 * (site.slope() * site.model.tails.trap_e).powi(6);
             Prediction { sixth: trap, ..site.moments(expected_e) }
@@ -448,7 +451,7 @@ mod tests {
         let site = Photosite::of_electrons(model, Equations::Exact);
         let spent = |allowed: u64| {
             let before = effort::left();
-            let found = effort::within(allowed, || site.mixture_of_kinds(1.5).0.moments.mean);
+            let found = effort::within(allowed, || site.mixture_of_kinds(1.5, true).0.moments.mean);
             (found.is_none(), before - effort::left())
         };
         let first = spent(20_000);

@@ -1,10 +1,10 @@
 //! What comes up on the way, for the user to hear.
 
-use crate::analysis::statistics::{RepeatedReport, Report};
+use crate::analysis::statistics::{ChannelReport, RegionReport, RepeatedReport, Report};
 use crate::formats::input::FrameReader;
 use crate::metadata::{AdcRecord, FrameHeader, Metadata};
 use crate::stream::RowSource;
-use crate::text::{counted, in_decimals};
+use crate::text::{counted, in_decimals, in_digits};
 
 /// Something that came up; whoever asked decides what to do with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -74,8 +74,32 @@ pub fn of_statistics(report: &Report) -> Vec<Note> {
     let beyond: u64 = report.regions.iter().map(|region| region.beyond_model).sum();
     let beyond = (beyond > 0)
         .then(|| counted(beyond, "pixels are beyond the model of a correction; they are left out of the statistics"));
-    let marked = saturated.into_iter().chain(defective).chain(beyond).map(Note::Warning);
+    let other = report.regions.iter().find_map(unlike_prediction);
+    let marked = saturated.into_iter().chain(defective).chain(beyond).chain(other).map(Note::Warning);
     Note::not_finite(not_finite).into_iter().chain(marked).collect()
+}
+
+/// A warning of a mean that is not that of the scene and the camera of the metadata, by far more than chance.
+fn unlike_prediction(region: &RegionReport) -> Option<String> {
+    /// Standard errors, and share of what is predicted.
+    const FAR: f64 = 30.0;
+    const SHARE: f64 = 0.02;
+    let is_whole =
+        region.saturated + region.defective + region.corrected + region.beyond_model + region.not_finite == 0;
+    let far = |channel: &ChannelReport| {
+        let (mean, predicted) = channel.mean.zip(channel.predicted_mean)?;
+        let is_far = channel.z_mean?.abs() > FAR && (mean - predicted).abs() > SHARE * predicted.abs();
+        is_far.then(|| {
+            let [mean, predicted] = [mean, predicted].map(|value| in_digits(value, 6));
+            format!(
+                "the mean of {} is {mean}, and {predicted} by its metadata: its samples were changed since, or these are of another \
+                 frame",
+                channel.name
+            )
+        })
+    };
+    let mut all = region.channels.iter().chain(&region.classes);
+    if is_whole && region.tests.is_empty() { all.find_map(far) } else { None }
 }
 
 /// What a reader found.
