@@ -7,6 +7,8 @@ use crate::numerics::quantiles::of_student;
 
 /// So many standard deviations are beyond chance.
 const BEYOND: f64 = 5.0;
+/// The confidence of an interval of as many.
+const CONFIDENCE: f64 = 1.0 - 5.7e-7;
 /// Signals of levels differ by so large a share where one is of more light.
 const LEAST_STEP: f64 = 0.01;
 /// Signals that miss the line of the response by so large a share are told of.
@@ -30,7 +32,8 @@ pub fn doubts(curve: &Curve, flats: &[Level], suspects: &[Suspect], confidence: 
          are taken from these"
             .to_owned()
     });
-    let falls = curve.interval(|values| values.dark_slope, confidence).is_some_and(|slope| slope.high < 0.0);
+    // As sure as 5 standard deviations, whatever the intervals are that are asked for.
+    let falls = curve.interval(|values| values.dark_slope, CONFIDENCE).is_some_and(|slope| slope.high < 0.0);
     let falling = falls
         .then(|| "the dark signal falls with exposure time beyond chance: is there a flat among the darks?".to_owned());
     let all = [

@@ -361,11 +361,17 @@ impl<S: RowSource> FlatFrames<S> {
         Ok(FlatMeans { means, photosites: counts.clone(), left_out, full: full.iter().sum(), limits, doubt })
     }
 
-    /// What is wrong with the Bayer array that they are said to be behind, where what photosites scatter by is known.
+    /// What is wrong with the array that they are said to be behind, Bayer or none, or that nothing tells, where what photosites scatter by
+    /// is known.
     fn doubt_of_array(&self, tally: &Tally) -> Option<String> {
-        let array =
-            self.head.metadata.cfa.filter(|array| array.bayer().is_some() && self.classes.period() == [2, 2])?;
-        Some(format!("{}: {}", self.head.name, tally.places()?.doubt(array)?))
+        if self.head.geometry.channels.len() > 1 {
+            return None;
+        }
+        let (name, doubt) = (&self.head.name, tally.places()?.doubt(self.head.metadata.cfa)?);
+        // Behind filters that count as none all classes have one mean.
+        let is_one = self.classes.count() == 1;
+        let lost = if is_one { " Divided as photosites of one class, frames lose the colors of their light" } else { "" };
+        Some(format!("{name}: {doubt}{lost}"))
     }
 
     /// What metadata keep of them.
