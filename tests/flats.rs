@@ -163,7 +163,9 @@ fn flats_behind_another_pattern_are_told() {
 #[test]
 fn flats_of_colors_that_count_as_one_class_are_told() {
     let shop = Workshop::new();
-    for (name, levels, seed) in [("light.fits", [4000.0, 6000.0, 3000.0], 1), ("flat.fits", [5500.0, 9000.0, 5000.0], 2)] {
+    for (name, levels, seed) in
+        [("light.fits", [4000.0, 6000.0, 3000.0], 1), ("flat.fits", [5500.0, 9000.0, 5000.0], 2)]
+    {
         write_fits(&shop, name, SIZE, &[], lit(levels, seed));
         let mut bytes = fs::read(shop.path(name)).unwrap();
         let card = b"BAYERPAT= '";
@@ -174,7 +176,10 @@ fn flats_of_colors_that_count_as_one_class_are_told() {
     let line = "correct-frame light.fits --black 500 --white 16000 --flat flat.fits";
     let one = "Divided as photosites of one class, frames lose the colors of their light";
     let said = shop.said(&format!("{line} -o one.exr"), 0);
-    assert!(said.contains("as behind filters, which nothing tells: is the array rggb or bggr?") && said.contains(one), "{said}");
+    assert!(
+        said.contains("as behind filters, which nothing tells: is the array rggb or bggr?") && said.contains(one),
+        "{said}"
+    );
     let said = shop.said(&format!("{line} --cfa monochrome -o none.exr"), 0);
     assert!(said.contains("unlike a monochrome sensor") && said.contains(one), "{said}");
     let said = shop.said(&format!("{line} --cfa rggb -o three.exr"), 0);

@@ -333,7 +333,8 @@ fn is_at_end(survey: &Survey, dimmer: impl Iterator<Item = [f64; 2]>) -> bool {
 /// Mean and temporal variance of a survey, over its grids.
 fn level_of(survey: &Survey) -> [f64; 2] {
     let count = survey.sites.len() as f64;
-    [|site: &SiteSurvey| site.mean, |site: &SiteSurvey| site.variance].map(|of| survey.sites.iter().map(of).sum::<f64>() / count)
+    [|site: &SiteSurvey| site.mean, |site: &SiteSurvey| site.variance]
+        .map(|of| survey.sites.iter().map(of).sum::<f64>() / count)
 }
 
 /// Warnings of frames whose fixed pattern is not that of the others of their condition, by most of the grids; of most of them it would be
@@ -345,7 +346,8 @@ pub fn doubt_of_patterns(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
             2 * survey.sites.iter().filter(|site| site.strangers.contains(frame)).count() > survey.sites.len()
         };
         let strangers: Vec<usize> = (0..group.files.len()).filter(are_told).collect();
-        if 2 * strangers.len() >= group.files.len() || group.condition.is_lit && is_at_end(survey, lit().map(level_of)) {
+        if 2 * strangers.len() >= group.files.len() || group.condition.is_lit && is_at_end(survey, lit().map(level_of))
+        {
             return None;
         }
         let first = group.files[*strangers.first()?].display();
@@ -512,7 +514,8 @@ mod tests {
     #[test]
     fn patterns_of_full_photosites_and_of_most_frames_are_not_doubted() {
         let told = |strangers: &[usize], at_top: u64, scales: [f32; 2]| {
-            let mut surveys = [(100.0, scales[0]), (1000.0, scales[1])].map(|(level, scale)| ended(level, scale, 4095.0, None));
+            let mut surveys =
+                [(100.0, scales[0]), (1000.0, scales[1])].map(|(level, scale)| ended(level, scale, 4095.0, None));
             surveys[1].sites[0].strangers = strangers.to_vec();
             surveys[1].sites[0].at_ends[0] = at_top;
             let files = ["a", "b", "c", "d"].map(PathBuf::from).to_vec();

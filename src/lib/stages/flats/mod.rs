@@ -370,7 +370,8 @@ impl<S: RowSource> FlatFrames<S> {
         let (name, doubt) = (&self.head.name, tally.places()?.doubt(self.head.metadata.cfa)?);
         // Behind filters that count as none all classes have one mean.
         let is_one = self.classes.count() == 1;
-        let lost = if is_one { " Divided as photosites of one class, frames lose the colors of their light" } else { "" };
+        let lost =
+            if is_one { " Divided as photosites of one class, frames lose the colors of their light" } else { "" };
         Some(format!("{name}: {doubt}{lost}"))
     }
 
