@@ -181,6 +181,11 @@ pub(crate) fn doubt(text: String) {
     }
 }
 
+/// Whether one of the doubts that came up since is such.
+pub(crate) fn has_doubt(is_such: impl Fn(&str) -> bool) -> bool {
+    register().as_ref().is_some_and(|register| register.doubts.iter().any(|doubt| is_such(doubt)))
+}
+
 /// The doubts that came up since the last call, for a program to warn of.
 pub fn doubts() -> Vec<String> {
     register().as_mut().map(|register| std::mem::take(&mut register.doubts)).unwrap_or_default()

@@ -185,6 +185,16 @@ impl<S: RowSource> FlatFrames<S> {
         }
     }
 
+    /// A dark frame of theirs that has more samples below zero so far than codes of a camera do, and their share.
+    pub fn darks_below_zero(&self) -> Option<(&str, f64)> {
+        self.darks()?.below_zero_beside(&self.fitness, self.frames.are_fractional())
+    }
+
+    /// A dark frame of theirs most samples of which are exactly zero so far, and their share.
+    pub fn darks_at_zero(&self) -> Option<(&str, f64)> {
+        self.darks()?.at_zero_beside(&self.fitness)
+    }
+
     /// Samples of theirs that were clipped so far.
     pub fn clipped(&self) -> u64 {
         self.frames.clipped() + self.darks().map_or(0, DarkFrames::clipped)
