@@ -315,7 +315,7 @@ pub fn doubt_of_frames(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
 
 /// Whether photosites of a survey are full or at an end of the codes, so that patterns and noise follow the light no more: more samples than
 /// few are there, or flats that are dimmer are as noisy.
-fn is_at_end(survey: &Survey, dimmer: impl Iterator<Item = [f64; 2]>) -> bool {
+fn is_at_end(survey: &Survey, mut dimmer: impl Iterator<Item = [f64; 2]>) -> bool {
     /// The share of samples that are few: stuck photosites.
     const FEW: f64 = 1e-3;
     /// Flats below such a share of a mean are dimmer.
@@ -327,7 +327,7 @@ fn is_at_end(survey: &Survey, dimmer: impl Iterator<Item = [f64; 2]>) -> bool {
     };
     let [mean, variance] = level_of(survey);
     let is_quieter = |[other, noise]: [f64; 2]| other < DIMMER * mean && noise >= variance;
-    survey.sites.iter().any(is_cut_off) || dimmer.into_iter().any(is_quieter)
+    survey.sites.iter().any(is_cut_off) || dimmer.any(is_quieter)
 }
 
 /// Mean and temporal variance of a survey, over its grids.
