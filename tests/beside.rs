@@ -164,8 +164,9 @@ fn dark_signals_that_the_sensor_predicts_are_not_doubted() {
     for (dark, dark_current_e_per_s, doubt) in cases {
         write(&shop, "light.fits", [300.0, dark], 1, &[]);
         write(&shop, "dark.fits", [0.0, dark], 2, &[("EXPTIME", "240.0")]);
+        // In 240 s a dark signal may be as much as the black level.
         let told = shop.said(line, 0);
-        assert!(told.contains(doubt), "{told}");
+        assert_eq!(told.contains(doubt), dark > 500.0, "{told}");
         for (current, is_told) in [(dark_current_e_per_s, false), (0.1 * dark_current_e_per_s, true)] {
             sensor(&shop, current);
             let told = shop.said(&format!("{line} --sensor s.yaml"), 0);
@@ -192,6 +193,76 @@ fn darks_without_their_bias_are_told_by_samples_below_zero() {
         let doubt = "of its samples are below zero, as no camera writes them; was a bias taken off?";
         assert_eq!(told.contains(doubt), is_told, "{level}: {told}");
     }
+    // A frame that comes near zero, or is no whole numbers as the dark frame is none, may lack its bias too.
+    let text = "of its samples are below zero";
+    write("dark.raw", 0.0, 10.0, 2);
+    write("light.raw", 20.0, 30.0, 1);
+    assert!(!shop.said(line, 0).contains(text));
+    let fine = |name: &str, level: f64, scatter: f64, seed: u64| {
+        let [width, height] = SIZE;
+        let sample = |x: u32, y: u32| to_sample(level + scatter * chance(x, y, seed));
+        let samples = (0..height).flat_map(|y| (0..width).flat_map(move |x| sample(x, y).to_le_bytes()));
+        fs::write(shop.path(name), samples.collect::<Vec<u8>>()).unwrap();
+    };
+    fine("dark.raw", 0.0, 10.0, 2);
+    for (is_fine, is_told) in [(false, true), (true, false)] {
+        if is_fine {
+            fine("light.raw", 1700.0, 30.0, 1)
+        } else {
+            write("light.raw", 1700.0, 30.0, 1)
+        }
+        let told = shop.said(line, 0);
+        assert_eq!(told.contains(text), is_told, "{is_fine}: {told}");
+    }
+}
+
+/// Dark frames less a bias that were cut off at zero, as whole numbers without a sign are: half of the samples and more are 0. A frame that is
+/// far from it has its bias; one that is not may be of black 0.
+#[test]
+fn darks_that_are_cut_off_at_zero_are_told() {
+    let shop = Workshop::new();
+    let codes = |name: &str, level: f64, scatter: f64, seed: u64| {
+        write_fits(&shop, name, SIZE, &[("INSTRUME", "'A'")], |x, y| level + scatter * chance(x, y, seed));
+    };
+    let line = "correct-frame light.fits --dark dark.fits --white 16383 -o out.exr";
+    let text = "of its samples are exactly 0, and nothing of what it comes off is near it; was a bias taken off";
+    for (light, dark, is_told) in [(1700.0, 0.0, true), (100.0, 0.0, false), (1700.0, 20.0, false)] {
+        codes("light.fits", light, 30.0, 1);
+        codes("dark.fits", dark, 10.0, 2);
+        let told = shop.said(line, 0);
+        assert_eq!(told.contains(text), is_told, "{light} {dark}: {told}");
+    }
+}
+
+/// Codes of 12 bits in 16 lie 16 apart: two of these above the bias of the sensor are no light. Where no time is told, the dark signal is that
+/// of a minute, 6 ADU of a sensor of 0.1 e⁻/s, ten times at most.
+#[test]
+fn levels_of_coarse_codes_and_of_unknown_times_have_room() {
+    let shop = Workshop::new();
+    sensor(&shop, 0.1);
+    let line = "correct-frame light.fits --dark dark.fits --sensor s.yaml -o out.exr";
+    let coarse = |name: &str, level: f64, scatter: f64, seed: u64| {
+        write_fits(&shop, name, SIZE, &[("INSTRUME", "'A'"), ("EXPTIME", "0.05")], |x, y| {
+            ((level + scatter * chance(x, y, seed)) / 16.0).round() * 16.0
+        });
+    };
+    coarse("light.fits", 4500.0, 400.0, 1);
+    for (level, is_told) in [(528.0, false), (576.0, true)] {
+        coarse("dark.fits", level, 40.0, 2);
+        let told = shop.said(line, 0);
+        assert_eq!(
+            told.contains("by the frame's sensor dark frames have 542.1 ADU at most"),
+            is_told,
+            "{level}: {told}"
+        );
+    }
+    write(&shop, "light.fits", [4000.0, 0.0], 1, &[]);
+    let text = "by the frame's sensor, in a minute, as no time is told, dark frames have 570.0 ADU at most";
+    for (level, is_told) in [(40.0, false), (100.0, true)] {
+        write(&shop, "dark.fits", [level, 0.0], 2, &[]);
+        let told = shop.said(line, 0);
+        assert_eq!(told.contains(text), is_told, "{level}: {told}");
+    }
 }
 
 /// A dark signal of 480 ADU in 240 s at 263 K: dark frames of a bias alone, and a frame that has none of it either, are told where the
@@ -208,7 +279,7 @@ fn dark_signals_far_below_those_of_the_sensor_are_told() {
         (480.0, 480.0, "-10.15", [false, false]),
         (160.0, 160.0, "-10.15", [false, false]),
         (0.0, 480.0, "-10.15", [true, false]),
-        (0.0, 0.0, "-10.15", [true, true]),
+        (0.0, 0.0, "-10.15", [false, true]),
         (0.0, 480.0, "", [false, false]),
         (0.0, 0.0, "", [false, false]),
     ] {
@@ -217,6 +288,16 @@ fn dark_signals_far_below_those_of_the_sensor_are_told() {
         write(&shop, "dark.fits", [0.0, dark], 2, &[&[DARK, time], told.as_slice()].concat());
         let said = shop.said(line, 0);
         assert_eq!([short, no_time].map(|text| said.contains(text)), wanted, "{dark} {of_light} {temperature}: {said}");
+    }
+    // A sensor of 100 times the dark current that is cooled so far has 48 ADU in place of 48000, and a warm one that tells it has not.
+    sensor(&shop, 200.0);
+    for (temperature, wanted) in [("", [false, false]), ("-10.15", [false, true])] {
+        let told: Vec<_> = [("CCD-TEMP", temperature)].into_iter().filter(|(_, value)| !value.is_empty()).collect();
+        write(&shop, "light.fits", [20.0, 48.0], 1, &[&[time], told.as_slice()].concat());
+        write(&shop, "dark.fits", [0.0, 48.0], 2, &[&[DARK, time], told.as_slice()].concat());
+        let said = shop.said(line, 0);
+        let texts = ["sensor, exposure and temperature dark frames have", "its sensor has a dark signal of"];
+        assert_eq!(texts.map(|text| said.contains(text)), wanted, "{temperature}: {said}");
     }
 }
 

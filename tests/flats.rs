@@ -157,3 +157,34 @@ fn flats_behind_another_pattern_are_told() {
         assert!(!said.contains("is the pattern"), "{said}");
     }
 }
+
+/// Flats of RGGB that nothing says the array of, or that are said to have none, are told, and what was divided by them as one class is not
+/// demosaicked: its colors are gone.
+#[test]
+fn flats_of_colors_that_count_as_one_class_are_told() {
+    let shop = Workshop::new();
+    for (name, levels, seed) in
+        [("light.fits", [4000.0, 6000.0, 3000.0], 1), ("flat.fits", [5500.0, 9000.0, 5000.0], 2)]
+    {
+        write_fits(&shop, name, SIZE, &[], lit(levels, seed));
+        let mut bytes = fs::read(shop.path(name)).unwrap();
+        let card = b"BAYERPAT= '";
+        let at = bytes.windows(card.len()).position(|window| window == card).unwrap();
+        bytes[at..at + 10].copy_from_slice(b"COMMENT   ");
+        fs::write(shop.path(name), bytes).unwrap();
+    }
+    let line = "correct-frame light.fits --black 500 --white 16000 --flat flat.fits";
+    let one = "Divided as photosites of one class, frames lose the colors of their light";
+    let said = shop.said(&format!("{line} -o one.exr"), 0);
+    assert!(
+        said.contains("as behind filters, which nothing tells: is the array rggb or bggr?") && said.contains(one),
+        "{said}"
+    );
+    let said = shop.said(&format!("{line} --cfa monochrome -o none.exr"), 0);
+    assert!(said.contains("unlike a monochrome sensor") && said.contains(one), "{said}");
+    let said = shop.said(&format!("{line} --cfa rggb -o three.exr"), 0);
+    assert!(!said.contains("is the array"), "{said}");
+    let refused = shop.said("demosaic one.exr --cfa rggb -o rgb.exr", 1);
+    assert!(refused.contains("it was divided by a flat field as photosites of one class"), "{refused}");
+    shop.said("demosaic three.exr -o rgb.exr", 0);
+}

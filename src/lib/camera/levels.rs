@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 /// Black levels are told to a quarter: nothing of a camera reads less than this share of its bias.
 pub const LEAST_OF_BIAS: f64 = 0.75;
 
+/// So many times less may the dark current of a sensor be where nothing tells that it is cooled: by 60 K or so.
+pub const OF_COOLED: f64 = 1e3;
+
 /// The least and the largest level of no light that go with a bias, ADU, where codes end at `top`: black levels count the dark signal of
 /// their exposures, which is a few per cent of the range, or half the bias.
 pub fn levels_of_bias(bias_adu: f64, top: f64) -> [f64; 2] {

@@ -28,8 +28,9 @@ const ALIKE: f64 = 0.25;
 const BEYOND: f64 = 6.0;
 
 impl Places {
-    /// What is wrong with an array, where it is not what the photosites are behind; other arrays than those of 2×2 are not looked at.
-    pub fn doubt(&self, array: FilterArray) -> Option<String> {
+    /// What is wrong with an array, where it is not what the photosites are behind, or there is one and nothing tells it; other arrays than
+    /// those of 2×2 are not looked at.
+    pub fn doubt(&self, array: Option<FilterArray>) -> Option<String> {
         let brightest = self.signal.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mean = self.signal.iter().sum::<f64>() / 4.0;
         // NaN is no signal.
@@ -37,9 +38,12 @@ impl Places {
             return None;
         }
         match array {
-            FilterArray::Bayer(pattern) => self.doubt_of_bayer(pattern, brightest),
-            FilterArray::Monochrome => self.doubt_of_none(mean),
-            FilterArray::Other(_) => None,
+            Some(FilterArray::Bayer(pattern)) => self.doubt_of_bayer(pattern, brightest),
+            Some(FilterArray::Monochrome) => {
+                self.doubt_of_none(mean, " and unlike a monochrome sensor, whose PRNU that would be")
+            }
+            None => self.doubt_of_none(mean, ", which nothing tells"),
+            Some(FilterArray::Other(_)) => None,
         }
         .map(|what| {
             let shares = self.signal.map(|signal| format!("{:.2}", signal / mean)).join(", ");
@@ -69,7 +73,7 @@ impl Places {
         })
     }
 
-    fn doubt_of_none(&self, mean: f64) -> Option<String> {
+    fn doubt_of_none(&self, mean: f64, unlike: &str) -> Option<String> {
         let order = |f: fn(f64, f64) -> bool| {
             (1..4).fold(0, |best, at| if f(self.signal[at], self.signal[best]) { at } else { best })
         };
@@ -94,7 +98,7 @@ impl Places {
             [] => "what filters are there?".to_owned(),
             _ => "which Bayer pattern is there?".to_owned(),
         };
-        Some(format!("as behind filters and unlike a monochrome sensor, whose PRNU that would be: {is_it}"))
+        Some(format!("as behind filters{unlike}: {is_it}"))
     }
 }
 
@@ -103,7 +107,7 @@ mod tests {
     use super::*;
 
     fn doubt(array: &str, signal: [f64; 4]) -> Option<String> {
-        Places { signal, variance: [1.0; 4] }.doubt(array.parse().unwrap())
+        Places { signal, variance: [1.0; 4] }.doubt(Some(array.parse().unwrap()))
     }
 
     /// Of red 500, greens of about 1000 and blue 575 each pattern is told from those with their greens on the other diagonal, which are
@@ -131,6 +135,9 @@ mod tests {
             let told = doubt("monochrome", signal).unwrap();
             assert!(told.ends_with(&format!("is the array {patterns}?")), "{told}");
         }
+        let untold = Places { signal: rggb, variance: [1.0; 4] }.doubt(None).unwrap();
+        assert!(untold.ends_with("as behind filters, which nothing tells: is the array rggb or bggr?"), "{untold}");
+        assert_eq!(Places { signal: [700.0; 4], variance: [1.0; 4] }.doubt(None), None);
         assert!(
             doubt("monochrome", [500.0, 1000.0, 1000.0, 500.0]).unwrap().ends_with("which Bayer pattern is there?")
         );

@@ -29,7 +29,7 @@ struct Register {
     inputs: HashMap<FileId, Input>,
     outputs: Vec<(FileId, String)>,
     reads_stdin: bool,
-    doubts: Vec<String>,
+    doubts: Vec<Doubt>,
 }
 
 /// A file that is read.
@@ -174,16 +174,58 @@ pub fn announce(outputs: &[Option<&Path>]) -> Result<()> {
 
 /// Notes what makes a result doubtful and was found out too late to refuse it: an image that its sidecar does not describe.
 pub(crate) fn doubt(text: String) {
+    doubt_alike(None, text);
+}
+
+/// Notes the same of what many frames may have in common: of several of a kind the first is told, and how many more there are.
+pub(crate) fn doubt_of_frame(kind: String, text: String) {
+    doubt_alike(Some(kind), text);
+}
+
+fn doubt_alike(kind: Option<String>, text: String) {
     if let Some(register) = &mut *register()
-        && !register.doubts.contains(&text)
+        && !register.doubts.iter().any(|doubt| doubt.texts.contains(&text))
     {
-        register.doubts.push(text);
+        match register.doubts.iter_mut().find(|doubt| kind.is_some() && doubt.kind == kind) {
+            Some(alike) => alike.texts.push(text),
+            None => register.doubts.push(Doubt { kind, texts: vec![text] }),
+        }
     }
+}
+
+/// Whether one of the doubts that came up since is such.
+pub(crate) fn has_doubt(is_such: impl Fn(&str) -> bool) -> bool {
+    register()
+        .as_ref()
+        .is_some_and(|register| register.doubts.iter().flat_map(|doubt| &doubt.texts).any(|text| is_such(text)))
 }
 
 /// The doubts that came up since the last call, for a program to warn of.
 pub fn doubts() -> Vec<String> {
-    register().as_mut().map(|register| std::mem::take(&mut register.doubts)).unwrap_or_default()
+    let doubts = register().as_mut().map(|register| std::mem::take(&mut register.doubts)).unwrap_or_default();
+    doubts.into_iter().flat_map(Doubt::told).collect()
+}
+
+/// What makes a result doubtful, of one or of several frames alike.
+#[derive(Debug)]
+struct Doubt {
+    kind: Option<String>,
+    texts: Vec<String>,
+}
+
+impl Doubt {
+    /// Each of few; of several the first, and how many more there are.
+    fn told(mut self) -> Vec<String> {
+        const FEW: usize = 2;
+        let more = self.texts.len().saturating_sub(1);
+        if more >= FEW {
+            // Frames may be read at once.
+            self.texts.sort();
+            self.texts.truncate(1);
+            self.texts.iter_mut().for_each(|text| *text = format!("{text}; so it is in {more} more frames"));
+        }
+        self.texts
+    }
 }
 
 impl Register {
@@ -208,6 +250,14 @@ fn same_file(output: &str, input: &str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn frames_of_one_doubt_are_counted() {
+        let of = |texts: &[&str]| Doubt { kind: None, texts: texts.iter().map(|text| (*text).into()).collect() }.told();
+        assert_eq!(of(&["b: full"]), ["b: full"]);
+        assert_eq!(of(&["b: full", "a: full"]), ["b: full", "a: full"]);
+        assert_eq!(of(&["b: full", "a: full", "c: full"]), ["a: full; so it is in 2 more frames"]);
+    }
 
     #[test]
     fn an_input_is_known_whichever_comes_first() {

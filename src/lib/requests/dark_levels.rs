@@ -1,7 +1,9 @@
 //! What came off a frame and cannot well be its dark signal, by its mean.
 
-use crate::camera::levels::{BlackLevel, LEAST_OF_BIAS};
+use crate::camera::levels::{BlackLevel, LEAST_OF_BIAS, OF_COOLED};
 use crate::camera::readout::ReadOut;
+use crate::formats::input::TOO_DARK;
+use crate::formats::register;
 use crate::metadata::{FrameHeader, MasterKind, Scene, TakenAs};
 use crate::stages::bounds::Bounds;
 use crate::stages::darks::{DRIFT, DarkFrames, DarkStack, Misfit};
@@ -25,6 +27,10 @@ pub(super) struct DarkLevels {
     least_predicted_adu: Option<f64>,
     /// What the mean of bias frames beside dark frames can well be at most, and what tells it.
     most_bias_adu: Option<(f64, &'static str)>,
+    /// Whether the exposure is so long that a dark signal may be as much as the black level.
+    is_long: bool,
+    /// Whether a black level or a bias is known, which darks without it lie below.
+    knows_black: bool,
 }
 
 impl DarkLevels {
@@ -40,6 +46,8 @@ impl DarkLevels {
             least_predicted_adu: predicted_adu.and_then(|predicted| least_predicted(frame, predicted)),
             most_bias_adu: darks.and_then(|darks| most_level(frame, darks, true)),
             black_adu: metadata.black_level_adu.filter(|_| metadata.adc.is_none()).map(BlackLevel::mean),
+            is_long: metadata.time_s().is_some_and(|time_s| time_s >= LONG_S) && predicted_adu.is_none(),
+            knows_black: metadata.black_level_adu.is_some() || metadata.bias_adu().is_some(),
         }
     }
 
@@ -57,7 +65,8 @@ impl DarkLevels {
     pub(super) fn doubt<S: RowSource>(&self, name: &str, darks: &DarkFrames<S>) -> Option<String> {
         let misfit = || darks.misfit().map(|misfit| doubt_of_misfit(name, misfit));
         let border = || darks.left_at_border().and_then(|left| doubt_of_border(name, left));
-        let below = || darks.below_zero().map(doubt_of_negatives);
+        let zeros = || darks.at_zero().filter(|_| !self.knows_black).map(doubt_of_zeros);
+        let below = || darks.below_zero().map(doubt_of_negatives).or_else(zeros);
         let Some([frame, dark]) = darks.means() else { return misfit().or_else(border).or_else(below) };
         let is_told = self.explains(dark);
         let range_adu = self.range_adu.filter(|_| !is_told);
@@ -65,8 +74,8 @@ impl DarkLevels {
         let low = self.doubt_of_least(name, dark);
         low.or_else(|| doubt_of_level(name, [frame, dark], range_adu))
             .or_else(misfit)
-            .or_else(|| doubt_of_scale(name, dark, black_adu))
-            .or_else(|| self.most_adu.and_then(|most| doubt_of_high(name, dark, most)))
+            .or_else(|| doubt_of_scale(name, dark, black_adu, |scale| !self.is_long || darks.are_multiples_of(scale)))
+            .or_else(|| self.most_adu.and_then(|most| doubt_of_high(name, dark, above(most, darks.step_of_frame()))))
             .or_else(|| self.doubt_of_bias(darks))
             .or_else(border)
             .or_else(below)
@@ -88,14 +97,18 @@ impl DarkLevels {
             self.doubt_of_least(name, dark).or_else(|| doubt_of_high(name, dark, self.most_adu?))
         };
         let doubt = below.or_else(level).or_else(|| self.doubt_of_bias(darks));
-        let doubt = doubt.or_else(|| darks.below_zero().map(doubt_of_negatives));
+        let doubt = doubt.or_else(|| flats.darks_below_zero().map(doubt_of_negatives));
+        let doubt = doubt.or_else(|| flats.darks_at_zero().filter(|_| !self.knows_black).map(doubt_of_zeros));
         doubt.into_iter().chain(darks.unlike().map(doubt_of_one)).collect()
     }
 
     /// A warning of a mean below what dark frames have.
     fn doubt_of_least(&self, name: &str, dark: f64) -> Option<String> {
         let low = self.least_adu.and_then(|least| doubt_of_low(name, dark, least));
-        low.or_else(|| self.least_predicted_adu.and_then(|least| doubt_of_short(name, dark, least)))
+        // A frame that lacks the dark signal itself is told of already.
+        let of_frame = || register::has_doubt(|doubt| doubt.starts_with(name) && doubt.contains(TOO_DARK));
+        let short = self.least_predicted_adu.and_then(|least| doubt_of_short(name, dark, least));
+        low.or_else(|| short.filter(|_| !of_frame()))
     }
 
     /// A warning of bias frames beside dark frames that are none.
@@ -109,7 +122,8 @@ impl DarkLevels {
                  exposed for long?"
             ));
         }
-        let (most, by) = self.most_bias_adu.filter(|(most, _)| bias > *most)?;
+        let most = self.most_bias_adu.map(|most| above(most, darks.step_of_frame()));
+        let (most, by) = most.filter(|(most, _)| bias > *most)?;
         Some(format!(
             "{name}: its mean is {bias:.1} ADU, and by the frame's {by} bias frames have {most:.1} ADU at most; was it lit, or exposed for long?"
         ))
@@ -120,6 +134,24 @@ impl DarkLevels {
 const NEAR: [f64; 2] = [4.0, 0.02];
 /// So many times may a dark signal be off what the sensor predicts: sensors of one model, and temperatures that nobody told, differ.
 const TIMES: f64 = 10.0;
+
+/// Exposures from here on may collect a dark signal of a whole black level, s.
+const LONG_S: f64 = 1.0;
+/// Frames of cameras that tell no time are exposed no longer, s; a dark signal [`TIMES`] as large as the sensor's is that of ten minutes.
+const UNTOLD_S: f64 = 60.0;
+/// Levels of a sensor that drifts differ by less than this share of its read noise.
+const OF_NOISE: f64 = 0.5;
+
+/// How far off a level frames may be, ADU, as far as the sensor tells its noise.
+fn near(level: f64, readout: &ReadOut, slope: f64) -> f64 {
+    let [near, share] = NEAR;
+    near.max(share * level.abs()).max(OF_NOISE * slope * readout.read_noise_e)
+}
+
+/// What a mean can well be at most, where codes lie a step apart: two of these more than where they are whole.
+fn above((most, by): (f64, &'static str), step: f64) -> (f64, &'static str) {
+    (if step > 1.0 { most + 2.0 * step } else { most }, by)
+}
 
 /// Black and white level of a frame, where both are known.
 fn range_of(frame: &FrameHeader) -> Option<[f64; 2]> {
@@ -194,10 +226,15 @@ fn most_level(frame: &FrameHeader, darks: &DarkStack, is_bias: bool) -> Option<(
         let masters = darks.masters();
         let of_masters = masters.iter().map(|master| (master.exposure_s.or(own.0), master.temperature_k.or(own.1)));
         let doses = std::iter::once(own).chain(of_masters).map(|conditions| dark_charge_e(readout, conditions));
-        let most_e = if is_bias { 0.0 } else { doses.into_iter().try_fold(0.0, |most: f64, e| Some(most.max(e?)))? };
+        let known = doses.into_iter().try_fold(0.0, |most: f64, e| Some(most.max(e?)));
+        let (most_e, by) = match known {
+            _ if is_bias => (0.0, "sensor"),
+            Some(most_e) => (most_e, "sensor"),
+            None => (dark_charge_e(readout, (Some(UNTOLD_S), own.1))?, "sensor, in a minute, as no time is told,"),
+        };
         let slope = metadata.adu_per_e().unwrap_or(readout.adu_per_e);
         let bias = metadata.bias_adu().unwrap_or(readout.bias_adu);
-        return Some((off(bias, NEAR) + TIMES * slope * most_e, "sensor"));
+        return Some((bias + near(bias, readout, slope) + TIMES * slope * most_e, by));
     }
     let is_short = is_bias || metadata.time_s().is_some_and(|time_s| time_s <= SHORT_S);
     let black = metadata.black_level_adu.filter(|_| is_short)?;
@@ -227,16 +264,16 @@ fn predicted_level(frame: &FrameHeader, darks: &DarkStack) -> Option<[f64; 2]> {
 }
 
 /// What the mean of dark frames is at least where the sensor predicts a dark signal above a bias, ADU; none of one that does not show. Where
-/// nothing tells the temperature, a cooled sensor has a tenth of it again.
+/// nothing tells the temperature, the sensor may be cooled.
 fn least_predicted(frame: &FrameHeader, [bias, signal]: [f64; 2]) -> Option<f64> {
     let metadata = &frame.metadata;
     let is_told = metadata.sensor_temperature_k.is_some() || metadata.noise.is_some();
     let readout = metadata.sensor.as_ref()?.readout.as_ref()?;
     // A full photosite has no more.
-    let full = 0.5 * metadata.adu_per_e().unwrap_or(readout.adu_per_e) * readout.full_well_e;
-    let least = (signal / if is_told { TIMES } else { TIMES * TIMES }).min(full);
-    let [near, share] = NEAR;
-    let off = near.max(share * bias.abs());
+    let slope = metadata.adu_per_e().unwrap_or(readout.adu_per_e);
+    let full = 0.5 * slope * readout.full_well_e;
+    let least = (signal / if is_told { TIMES } else { TIMES * OF_COOLED }).min(full);
+    let off = near(bias, readout, slope);
     (least > off).then_some(bias - off + least)
 }
 
@@ -297,6 +334,15 @@ fn doubt_of_negatives((name, share): (&str, f64)) -> String {
     )
 }
 
+/// A warning of dark frames that are cut off at zero, beside a frame that is far above it.
+fn doubt_of_zeros((name, share): (&str, f64)) -> String {
+    format!(
+        "{name}: {:.0} % of its samples are exactly 0, and nothing of what it comes off is near it; was a bias taken off, and what fell below \
+         zero cut off? What it lacks stays in the frame",
+        100.0 * share
+    )
+}
+
 /// A warning of what came off a frame and cannot well be dark frames of it, by the samples of both.
 fn doubt_of_misfit(name: &str, misfit: Misfit) -> String {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
@@ -320,14 +366,19 @@ fn doubt_of_misfit(name: &str, misfit: Misfit) -> String {
     }
 }
 
-/// A warning of what came off a frame and is a few times its black level, as frames of another number of bits are.
-fn doubt_of_scale(name: &str, dark: f64, black: Option<f64>) -> Option<String> {
+/// A warning of what came off a frame and is a few times its black level, as frames of another number of bits are, as far as they can be of
+/// such a scale.
+fn doubt_of_scale(name: &str, dark: f64, black: Option<f64>, can_be: impl Fn(u64) -> bool) -> Option<String> {
     /// Numbers of bits differ by no more.
-    const MOST_BITS: i32 = 4;
+    const MOST_BITS: u32 = 4;
     /// Black levels are told, and dark signals are small, to this share.
     const NEAR: f64 = 0.05;
     let ratio = dark / black.filter(|black| *black > 0.0)?;
-    let scale = (1..=MOST_BITS).map(|bits| 2_f64.powi(bits)).find(|scale| (ratio / scale - 1.0).abs() < NEAR)?;
+    let is_near = |bits: &u32| (ratio / f64::from(*bits).exp2() - 1.0).abs() < NEAR;
+    let scale = 1_u64 << (1..=MOST_BITS).find(is_near)?;
+    if !can_be(scale) {
+        return None;
+    }
     Some(format!(
         "{name}: what came off has a mean of {dark:.1} ADU, {scale} times its black level; are these of another number of bits, or is that \
          dark signal?"

@@ -104,15 +104,17 @@ struct Level {
     count: f64,
     sum: f64,
     squares: f64,
-    /// How many are below zero.
+    /// How many are below zero, exactly zero, and no whole numbers.
     below_zero: f64,
+    at_zero: f64,
+    fractional: f64,
 }
 
 impl Level {
     /// Takes in samples, in lanes of their own so that one sum need not wait for another.
     fn take(&mut self, samples: &[f32]) {
         const LANES: usize = 8;
-        let mut lanes = [[0.0_f64; LANES]; 4];
+        let mut lanes = [[0.0_f64; LANES]; 6];
         for chunk in samples.chunks(LANES) {
             for (lane, sample) in chunk.iter().enumerate() {
                 let (one, sample) = if sample.is_finite() { (1.0, f64::from(*sample)) } else { (0.0, 0.0) };
@@ -120,13 +122,17 @@ impl Level {
                 lanes[1][lane] += sample;
                 lanes[2][lane] += sample * sample;
                 lanes[3][lane] += if sample < 0.0 { 1.0 } else { 0.0 };
+                lanes[4][lane] += if sample == 0.0 { one } else { 0.0 };
+                lanes[5][lane] += if sample.fract() == 0.0 { 0.0 } else { 1.0 };
             }
         }
-        let [count, sum, squares, below_zero] = lanes.map(|lane| lane.iter().sum::<f64>());
+        let [count, sum, squares, below_zero, at_zero, fractional] = lanes.map(|lane| lane.iter().sum::<f64>());
         self.count += count;
         self.sum += sum;
         self.squares += squares;
         self.below_zero += below_zero;
+        self.at_zero += at_zero;
+        self.fractional += fractional;
     }
 }
 
@@ -180,6 +186,21 @@ impl<S: RowSource> Frames<S> {
         let shares = self.levels.iter().map(|level| level.below_zero / level.count);
         let (frame, share) = self.frames.iter().zip(shares).find(|(_, share)| *share > MOST)?;
         Some((frame.header().name.as_str(), share))
+    }
+
+    /// The first frame most samples of which are exactly zero so far, and their share.
+    pub fn at_zero(&self) -> Option<(&str, f64)> {
+        const MOST: f64 = 0.5;
+        let shares = self.levels.iter().map(|level| level.at_zero / level.count);
+        let (frame, share) = self.frames.iter().zip(shares).find(|(_, share)| *share > MOST)?;
+        Some((frame.header().name.as_str(), share))
+    }
+
+    /// Whether most samples of all so far are no whole numbers, as no camera writes them.
+    pub fn are_fractional(&self) -> bool {
+        let [fractional, count] =
+            self.levels.iter().fold([0.0; 2], |[some, all], level| [some + level.fractional, all + level.count]);
+        2.0 * fractional > count
     }
 
     /// Each of them.

@@ -3,10 +3,13 @@
 use super::curve::{Bend, Curve, below_saturation};
 use super::level::Level;
 use super::suspects::Suspect;
+use super::tally::SiteSurvey;
 use crate::numerics::quantiles::of_student;
 
 /// So many standard deviations are beyond chance.
 const BEYOND: f64 = 5.0;
+/// The confidence of an interval of as many.
+const CONFIDENCE: f64 = 1.0 - 5.7e-7;
 /// Signals of levels differ by so large a share where one is of more light.
 const LEAST_STEP: f64 = 0.01;
 /// Signals that miss the line of the response by so large a share are told of.
@@ -30,7 +33,8 @@ pub fn doubts(curve: &Curve, flats: &[Level], suspects: &[Suspect], confidence: 
          are taken from these"
             .to_owned()
     });
-    let falls = curve.interval(|values| values.dark_slope, confidence).is_some_and(|slope| slope.high < 0.0);
+    // As sure as 5 standard deviations, whatever the intervals are that are asked for.
+    let falls = curve.interval(|values| values.dark_slope, CONFIDENCE).is_some_and(|slope| slope.high < 0.0);
     let falling = falls
         .then(|| "the dark signal falls with exposure time beyond chance: is there a flat among the darks?".to_owned());
     let all = [
@@ -41,8 +45,8 @@ pub fn doubts(curve: &Curve, flats: &[Level], suspects: &[Suspect], confidence: 
         exchanged(curve, flats),
         missed(curve),
         drifting(curve, flats),
-        bent(curve, confidence).filter(|_| !is_named),
-        cut_off(curve, flats),
+        bent(curve, confidence).or_else(|| curved(curve)).filter(|_| !is_named),
+        cut_off(curve, flats).or_else(|| smoothed(curve, flats)),
     ];
     all.into_iter().flatten().collect()
 }
@@ -121,21 +125,41 @@ fn drifting(curve: &Curve, flats: &[Level]) -> Option<String> {
     })
 }
 
-/// Temporal noise of flats that has no tails, as where a camera mends what is far off.
-fn cut_off(curve: &Curve, flats: &[Level]) -> Option<String> {
-    /// Noise that is rounded, to codes of its standard deviation or finer, lacks less.
-    const LEAST: f64 = -0.1;
+/// The mean of what grids of fitted flats tell, by its variances, and what it scatters by, a standard deviation.
+fn of_fitted(curve: &Curve, flats: &[Level], of: impl Fn(&SiteSurvey) -> [f64; 2]) -> [f64; 2] {
     /// A variance of less codes² is one of few codes.
     const LEAST_VARIANCE: f64 = 1.0;
     let [mut all, mut sum] = [0.0; 2];
     for flat in curve.fitted().iter().map(|&flat| &flats[flat]).filter(|flat| flat.variance >= LEAST_VARIANCE) {
-        for [excess, variance] in flat.sites.iter().map(|site| site.excess) {
+        for [value, variance] in flat.sites.iter().map(&of) {
             all += 1.0 / variance;
-            sum += excess / variance;
+            sum += value / variance;
         }
     }
-    let excess = sum / all;
-    (excess < LEAST && excess < -BEYOND / all.sqrt()).then(|| {
+    [sum / all, all.sqrt().recip()]
+}
+
+/// Temporal noise of flats that neighbors have in common, as where a camera smooths samples.
+fn smoothed(curve: &Curve, flats: &[Level]) -> Option<String> {
+    /// Charge that spills into the next photosites leaves less.
+    const LEAST: f64 = 0.03;
+    let of_axis = |axis: usize| of_fitted(curve, flats, |site| site.neighbors[axis]);
+    let is_told = |[shared, scatter]: &[f64; 2]| shared.abs() > LEAST && shared.abs() > BEYOND * scatter;
+    let told = ["row", "column"].into_iter().enumerate().map(|(axis, line)| (line, of_axis(axis)));
+    let told = told.filter(|(_, found)| is_told(found));
+    let (line, [shared, _]) = told.max_by(|(_, a), (_, b)| a[0].abs().total_cmp(&b[0].abs()))?;
+    Some(format!(
+        "temporal noise of flats is shared by neighbors in a {line}, a correlation of {shared:.2} beyond that of photosites farther apart: where the \
+         camera mends or smooths samples by itself, the gain is wrong, and dark noise with it; take frames without its noise reduction"
+    ))
+}
+
+/// Temporal noise of flats that has no tails, as where a camera mends what is far off.
+fn cut_off(curve: &Curve, flats: &[Level]) -> Option<String> {
+    /// Noise that is rounded, to codes of its standard deviation or finer, lacks less.
+    const LEAST: f64 = -0.1;
+    let [excess, scatter] = of_fitted(curve, flats, |site| site.excess);
+    (excess < LEAST && excess < -BEYOND * scatter).then(|| {
         format!(
             "temporal noise of flats has fewer samples far off than noise has, an excess kurtosis of {excess:.2}: where the camera mends or smooths \
              samples by itself, the gain is wrong, and dark noise with it; take frames without its noise reduction"
@@ -161,4 +185,76 @@ fn bent(curve: &Curve, confidence: f64) -> Option<String> {
             width * 100.0
         )
     })
+}
+
+/// Variances that are no line over their means, whatever the light is, as those of a curve of tones are.
+fn curved(curve: &Curve) -> Option<String> {
+    /// Photosites that share charge where they are full bend it by less.
+    const LEAST: f64 = 0.03;
+    let missed = curve.gain_error.filter(|missed| *missed >= LEAST)?;
+    Some(format!(
+        "variances of flats miss their line over the mean by {:.1} % of the largest, far beyond chance: the response bends, as where codes went \
+         through a curve of tones, or the camera processes them by level; the gain is that of no level, and its interval that of the slope",
+        missed * 100.0
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::findings::of_class;
+    use super::super::level::{Condition, Level};
+    use super::super::settings::Settings;
+    use super::super::survey::survey;
+    use crate::frame::{Geometry, to_sample};
+    use crate::metadata::{FrameHeader, Metadata};
+    use crate::random::philox::philox4x32_10;
+    use crate::stream::MemoryFrame;
+    use crate::units::QuantityKind;
+
+    const SIDE: usize = 64;
+
+    /// A number of mean 0 and variance 1: the sum of 12 uniform ones.
+    fn normal(place: usize, frame: u32, key: u32) -> f64 {
+        let words = (0..3).flat_map(|part| philox4x32_10([u32::try_from(place).unwrap(), frame, part, key], [8, 9]));
+        words.map(|word| f64::from(word) / 4_294_967_296.0).sum::<f64>() - 6.0
+    }
+
+    /// Two frames of a camera of black 200, half a code to an electron and a noise of 2 codes, whose codes are changed so.
+    fn level(signal: f64, time_s: f64, key: u32, change: &dyn Fn(f64) -> f64) -> Level {
+        let of = |frame: u32| {
+            let geometry = Geometry::new(SIDE, SIDE, &["Y"]);
+            let header = FrameHeader { name: "a".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+            let noise = |place: usize| (0.5 * signal + 4.0).sqrt() * normal(place, frame, key);
+            let code = |place: usize| to_sample(change(200.0 + signal + noise(place)).round());
+            MemoryFrame::new(header, (0..SIDE * SIDE).map(code).collect())
+        };
+        let sites = survey(&mut [of(0), of(1)], Some(4095.0), false).unwrap().sites;
+        let condition = Condition { is_lit: signal > 0.0, exposure_s: Some(time_s), ..Condition::default() };
+        Level::of(key as usize, condition, sites)
+    }
+
+    /// What is doubted of six flats and their darks.
+    fn doubted(change: &dyn Fn(f64) -> f64, drop_adu: f64) -> Vec<String> {
+        let times = || (1..=6_u32).map(|time| (time, 0.01 * f64::from(time)));
+        let flats: Vec<Level> = times().map(|(key, s)| level(40_000.0 * s, s, key, change)).collect();
+        let dark = |(key, s): (u32, f64)| level(0.0, s, 10 + key, &|code| change(code - drop_adu * f64::from(key)));
+        let darks: Vec<Level> = times().map(dark).collect();
+        let settings = Settings { confidence: 0.95, photon_error: 0.0, are_codes: true, top: Some(4095.0) };
+        of_class("Y", &flats, &darks, &darks, &settings).doubts
+    }
+
+    /// A gamma of 1.2 is told, by variances or by the light, and a straight response is not. Means of darks of 2 codes over two frames of 4096 photosites scatter by 0.02
+    /// codes, their slope over six times by 0.005 codes a time: one that falls by 0.012, two or three standard deviations, is not told, and one by 0.2 is.
+    #[test]
+    fn curves_of_tones_and_falling_darks_are_told_beyond_chance() {
+        let bends = |doubts: &[String]| doubts.iter().any(|doubt| doubt.contains("the response bends"));
+        let falls = |doubts: &[String]| doubts.iter().any(|doubt| doubt.contains("the dark signal falls"));
+        let straight = |code: f64| code;
+        for (drop_adu, wanted) in [(0.0, false), (0.012, false), (0.2, true)] {
+            let doubts = doubted(&straight, drop_adu);
+            assert_eq!([bends(&doubts), falls(&doubts)], [false, wanted], "{drop_adu}: {doubts:?}");
+        }
+        let doubts = doubted(&|code| 4095.0 * (code / 4095.0).powf(1.0 / 1.2), 0.0);
+        assert!(bends(&doubts), "{doubts:?}");
+    }
 }

@@ -13,6 +13,7 @@ mod lanes;
 mod level;
 mod limit;
 mod linearity;
+mod neighbors;
 mod pattern;
 mod prints;
 mod reasons;

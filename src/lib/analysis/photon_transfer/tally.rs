@@ -1,6 +1,7 @@
 //! Sums over a grid of photosites, row by row, and what they tell.
 
 use super::lanes::{depart, dot, sum};
+use super::neighbors::NeighborSums;
 use super::sites::Site;
 use super::strangers::{RowSlopes, excess};
 use super::stuck::StandIn;
@@ -42,6 +43,9 @@ pub struct SiteSurvey {
     pub frame_means: Vec<f64>,
     /// Excess kurtosis of the temporal noise, and what it scatters by, a variance.
     pub excess: [f64; 2],
+    /// The correlation of the temporal noise of neighbors, in a row and in a column, beyond that of photosites farther apart, each with what it
+    /// scatters by, a variance.
+    pub neighbors: [[f64; 2]; 2],
     /// Frames whose fixed pattern is not that of the others.
     pub strangers: Vec<usize>,
     /// Two frames whose samples are the same, or differ by one number alone, though they vary from photosite to photosite.
@@ -89,6 +93,8 @@ pub struct Tally {
     products: Vec<f64>,
     /// What each frame of a row has of their mean.
     slopes: RowSlopes,
+    /// What neighbors have in common.
+    neighbors: NeighborSums,
     /// Σ d² and Σ d⁴, d the differences of ȳ between neighbors in a row.
     steps: [f64; 2],
     /// Σ q and Σ q², q the sum of squares of a photosite about its row.
@@ -129,6 +135,7 @@ impl Tally {
             squares: 0.0,
             products: vec![0.0; frames],
             slopes: RowSlopes::new(frames),
+            neighbors: NeighborSums::new(columns, if frames == 2 { 1 } else { frames }),
             steps: [0.0; 2],
             within: [0.0; 2],
             samples: vec![0.0; columns * frames],
@@ -237,7 +244,7 @@ impl Tally {
         let of_steps = [sum(squared), dot(squared, squared)];
         self.steps.iter_mut().zip(of_steps).for_each(|(sum, of_row)| *sum += of_row);
         self.squared.fill(0.0);
-        let (summed, times) = (self.summed(), self.times());
+        let (summed, times, row) = (self.summed(), self.times(), self.row_means.len() - 1);
         let mut all = 0.0;
         let columns_of = self.column_sums.chunks_exact_mut(columns);
         for ((index, samples), of_columns) in
@@ -249,6 +256,7 @@ impl Tally {
             self.products[index] += product;
             self.slopes.add(product - of_row * above / count, squares - above * above / count);
             self.row_sums.push(of_row);
+            self.neighbors.add(index, row, samples);
             all += square;
             let about = of_row / count;
             for (squared, sample) in self.squared.iter_mut().zip(&*samples) {
@@ -384,6 +392,7 @@ impl Tally {
             temporal,
             spatial,
             excess: excess(self.within, self.frames, n),
+            neighbors: self.neighbors.finish(self.frames),
             strangers,
             fourth,
             frame_means: drifts.iter().map(|drift| mean + drift).collect(),

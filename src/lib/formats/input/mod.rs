@@ -14,6 +14,7 @@ mod time;
 mod top;
 
 pub use options::{InputOptions, Linearizing, OfCamera};
+pub(crate) use time::TOO_DARK;
 
 use self::checks::Checks;
 use self::described::DigestCheck;

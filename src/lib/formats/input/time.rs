@@ -1,5 +1,6 @@
 //! Exposure times beside samples: what the sensor would have collected in them without light, and light that no such time has.
 
+use crate::camera::levels::OF_COOLED;
 use crate::camera::optics::is_frame_time_in_ms;
 use crate::formats::register;
 use crate::metadata::{FrameHeader, TakenAs};
@@ -8,8 +9,10 @@ use crate::units::QuantityKind;
 
 /// Times from here on may be ms or the denominator of a shutter, s.
 const LEAST_S: f64 = 2.0;
-/// So many times may a dark signal be off what the sensor predicts; and again as many where nobody tells the temperature.
+/// So many times may a dark signal be off what the sensor predicts.
 const TIMES: f64 = 10.0;
+/// What is said of a frame that lacks the dark signal of its sensor.
+pub const TOO_DARK: &str = "its sensor has a dark signal of";
 /// Levels are told to so many ADU, and to such a share.
 const NEAR: [f64; 2] = [4.0, 0.02];
 /// Samples of a stretch, and one pair of rows in so many that is looked at.
@@ -102,9 +105,9 @@ impl TimeCheck {
             && self.darkest - bias < least - NEAR[0].max(NEAR[1] * bias.abs())
         {
             return Some(format!(
-                "in its exposure of {time_s} s its sensor has a dark signal of {least:.0} ADU at least, and the darkest part of the frame is \
-                 {:.0} ADU above the bias; {in_ms}, and 1/{time_s} s is {of_shutter} s, unless the camera takes dark signal \
-                 off itself",
+                "in its exposure of {time_s} s {TOO_DARK} {least:.0} ADU at least, and the darkest part of the frame is \
+                 {:.0} ADU above the bias; {in_ms}, and 1/{time_s} s is {of_shutter} s, unless the sensor is cooled further than \
+                 `sensor_temperature_k` tells, or the camera takes dark signal off itself",
                 self.darkest - bias
             ));
         }
@@ -125,7 +128,7 @@ fn least_dark(frame: &FrameHeader, time_s: f64) -> Option<[f64; 2]> {
     let readout = metadata.sensor.as_ref()?.readout.as_ref()?;
     let temperature_k = metadata.sensor_temperature_k;
     let [ordinary_e, _] = readout.dark_charges_e(temperature_k.unwrap_or(readout.temperature_k), Some(time_s))?;
-    let times = if temperature_k.is_some() { TIMES } else { TIMES * TIMES };
+    let times = if temperature_k.is_some() { TIMES } else { TIMES * OF_COOLED };
     // A full photosite has no more.
     let least_e = (ordinary_e / times).min(0.5 * readout.full_well_e);
     let bias = readout.bias_adu;

@@ -64,9 +64,10 @@ impl TopCheck {
             (None, true) => "nothing marks which pixels used them; EXR would".to_owned(),
             (None, false) => "no white level tells that they are".to_owned(),
         };
-        register::doubt(format!(
+        let text = format!(
             "{}: {count} of its samples are at the largest value, {value}, as saturated ones are, and {advice}",
             frame.name
-        ));
+        );
+        register::doubt_of_frame(format!("{value} {advice}"), text);
     }
 }

@@ -26,7 +26,7 @@ pub(super) fn of_patches(
             read.len()
         )),
         _ => Some(format!(
-            "more scatter than noise within {}: texture, glare, a gradient or an edge; check the corners",
+            "more scatter than noise within {}: texture, glare, a gradient or an edge, or greens or amplifiers that differ; check the corners",
             names(&uneven)
         )),
     };

@@ -170,7 +170,7 @@ pub fn doubt_of_array(head: &FrameHeader, groups: &[Group], surveys: &[Survey]) 
     for (place, (flat, black)) in flat.quad.iter().zip(black).enumerate() {
         places.signal[(place / 2 + y0) % 2 * 2 + (place + x0) % 2] = flat - black;
     }
-    places.doubt(array).map(|doubt| Note::Warning(format!("{}: {doubt}", head.name)))
+    places.doubt(Some(array)).map(|doubt| Note::Warning(format!("{}: {doubt}", head.name)))
 }
 
 /// The temporal variance of darks in codes² of which photosites that are full spread over several codes.
@@ -313,13 +313,43 @@ pub fn doubt_of_frames(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
     groups.iter().zip(surveys).filter_map(doubt).collect()
 }
 
-/// Warnings of frames whose fixed pattern is not that of the others of their condition, by most of the grids.
+/// Whether photosites of a survey are full or at an end of the codes, so that patterns and noise follow the light no more: more samples than
+/// few are there, or flats that are dimmer are as noisy.
+fn is_at_end(survey: &Survey, mut dimmer: impl Iterator<Item = [f64; 2]>) -> bool {
+    /// The share of samples that are few: stuck photosites.
+    const FEW: f64 = 1e-3;
+    /// Flats below such a share of a mean are dimmer.
+    const DIMMER: f64 = 0.97;
+    let is_cut_off = |site: &SiteSurvey| {
+        let samples = (site.count() * site.frames) as f64;
+        let at_end = site.at_ends[0].max(site.at_ends[1]) as f64;
+        at_end > FEW * samples || site.full as f64 > FEW * site.count() as f64
+    };
+    let [mean, variance] = level_of(survey);
+    let is_quieter = |[other, noise]: [f64; 2]| other < DIMMER * mean && noise >= variance;
+    survey.sites.iter().any(is_cut_off) || dimmer.any(is_quieter)
+}
+
+/// Mean and temporal variance of a survey, over its grids.
+fn level_of(survey: &Survey) -> [f64; 2] {
+    let count = survey.sites.len() as f64;
+    [|site: &SiteSurvey| site.mean, |site: &SiteSurvey| site.variance]
+        .map(|of| survey.sites.iter().map(of).sum::<f64>() / count)
+}
+
+/// Warnings of frames whose fixed pattern is not that of the others of their condition, by most of the grids; of most of them it would be
+/// the others that differ, or light that changes where photosites are nearly full.
 pub fn doubt_of_patterns(groups: &[Group], surveys: &[Survey]) -> Vec<Note> {
+    let lit = || groups.iter().zip(surveys).filter(|(group, _)| group.condition.is_lit).map(|(_, survey)| survey);
     let doubt = |(group, survey): (&Group, &Survey)| {
         let are_told = |frame: &usize| {
             2 * survey.sites.iter().filter(|site| site.strangers.contains(frame)).count() > survey.sites.len()
         };
         let strangers: Vec<usize> = (0..group.files.len()).filter(are_told).collect();
+        if 2 * strangers.len() >= group.files.len() || group.condition.is_lit && is_at_end(survey, lit().map(level_of))
+        {
+            return None;
+        }
         let first = group.files[*strangers.first()?].display();
         let more = if strangers.len() > 1 { format!(" and {} more", strangers.len() - 1) } else { String::new() };
         let others = if group.condition.is_lit { "flats of its light" } else { "darks of its time" };
@@ -477,6 +507,26 @@ mod tests {
         assert!(doubt("monochrome", 1.0).unwrap().ends_with("is the array rggb or bggr?"));
         assert_eq!(doubt("monochrome", 1e-3), None);
         assert_eq!(doubt("grbg", 1e-3), None);
+    }
+
+    /// One of four flats is named; two of four are not, nor one that is clipped, or as quiet as a dimmer flat, whose pattern changes with
+    /// little light.
+    #[test]
+    fn patterns_of_full_photosites_and_of_most_frames_are_not_doubted() {
+        let told = |strangers: &[usize], at_top: u64, scales: [f32; 2]| {
+            let mut surveys =
+                [(100.0, scales[0]), (1000.0, scales[1])].map(|(level, scale)| ended(level, scale, 4095.0, None));
+            surveys[1].sites[0].strangers = strangers.to_vec();
+            surveys[1].sites[0].at_ends[0] = at_top;
+            let files = ["a", "b", "c", "d"].map(PathBuf::from).to_vec();
+            let groups = [0, 1].map(|_| Group { files: files.clone(), ..group(true) });
+            doubt_of_patterns(&groups, &surveys).iter().map(|note| note.text().to_owned()).collect::<Vec<_>>()
+        };
+        let one = told(&[1], 0, [1.0, 3.0]);
+        assert!(one.len() == 1 && one[0].starts_with("b: its fixed pattern is not that of the other flats"), "{one:?}");
+        assert!(told(&[0, 1], 0, [1.0, 3.0]).is_empty());
+        assert!(told(&[1], 40, [1.0, 3.0]).is_empty());
+        assert!(told(&[1], 0, [3.0, 1.0]).is_empty());
     }
 
     /// A survey of two frames of a level with noise of this scale, the codes of which end at `end`; `white` is what is said to be their end.

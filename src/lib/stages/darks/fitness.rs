@@ -68,6 +68,10 @@ pub struct Fitness {
     least_ratio: Option<f64>,
     /// The sum of the scatters of the darks.
     scatter: f64,
+    /// The least of the means of stretches of the frame as multiples of what neighbors in them differ by.
+    nearest: Option<f64>,
+    /// Whether some samples of the frame are no whole numbers.
+    pub(super) is_fractional: bool,
 }
 
 /// Why what came off cannot well be dark frames.
@@ -120,6 +124,9 @@ impl Fitness {
         let ratio = if b > 0.0 { a / b } else { 0.0 };
         self.least_ratio = Some(self.least_ratio.map_or(ratio, |least| least.min(ratio)));
         self.scatter += of_darks;
+        let above_zero = if a > 0.0 { a / of_frame } else { 0.0 };
+        self.nearest = Some(self.nearest.map_or(above_zero, |nearest| nearest.min(above_zero)));
+        self.is_fractional |= frame.iter().any(|sample| sample.fract() != 0.0);
         self.below += u64::from(b - a > margin);
         if !has_noise_of_one || of_darks < LEAST_SCATTER {
             return;
@@ -133,6 +140,23 @@ impl Fitness {
         }
         self.scattering[0] += 1;
         self.scattering[1] += u64::from(is_less);
+    }
+
+    /// Whether means of the frame come as near zero as so many times what neighbors differ by; none where nothing was looked at.
+    pub(in crate::stages) fn comes_near_zero(&self, times: f64) -> Option<bool> {
+        self.nearest.map(|nearest| nearest <= times)
+    }
+
+    /// The step that all codes of the frame lie apart by, however few they are; 1 where some are no whole numbers.
+    pub(super) fn step_of_frame(&self) -> f64 {
+        let [Steps { bits, has_others, .. }, _] = self.steps;
+        if bits == 0 || has_others { 1.0 } else { f64::from(bits.trailing_zeros()).exp2() }
+    }
+
+    /// Whether codes of the darks lie multiples of a power of two apart, however few they are.
+    pub(super) fn are_darks_multiples_of(&self, scale: u64) -> bool {
+        let [_, Steps { bits, has_others, .. }] = self.steps;
+        bits != 0 && !has_others && bits.trailing_zeros() >= scale.trailing_zeros()
     }
 
     /// Whether codes of the frame may be those of the darks times a step: then all of it is above its bias, so many times that of the darks.
@@ -212,6 +236,16 @@ mod tests {
         for levels in [[0.0, 0.0], [0.0, 50.0], [0.0, 9000.0], [500.0, 3000.0]] {
             assert_eq!(seen(levels, 1.0, 1.0).misfit(), None, "{levels:?}");
         }
+    }
+
+    /// A frame above its bias of 400 ADU is some 60 times what neighbors differ by above 0; its codes are whole.
+    #[test]
+    fn what_a_frame_has_above_zero_is_known() {
+        let seen = seen([0.0, 3000.0], 4.0, 1.0);
+        assert_eq!([30.0, 300.0].map(|times| seen.comes_near_zero(times)), [Some(false), Some(true)]);
+        assert_eq!(Fitness::default().comes_near_zero(30.0), None);
+        assert_eq!((seen.step_of_frame(), seen.is_fractional), (1.0, false));
+        assert_eq!([2, 4, 8].map(|scale| seen.are_darks_multiples_of(scale)), [true, true, false]);
     }
 
     #[test]

@@ -131,10 +131,52 @@ impl<S: RowSource> DarkFrames<S> {
         self.masters.iter().find_map(Frames::unlike)
     }
 
-    /// A dark frame that has more samples below zero so far than codes of a camera do, and their share.
+    /// A dark frame that has more samples below zero so far than codes of a camera do, and their share, where what it came off does not lack its
+    /// bias too.
     pub fn below_zero(&self) -> Option<(&str, f64)> {
+        self.below_zero_beside(&self.fitness, self.fitness.is_fractional)
+    }
+
+    /// The same where what it came off looked so, and was no whole numbers where it `is_fractional`, as what a bias was taken off: where it comes
+    /// near zero, or is none as the darks are, its bias may be off too.
+    pub(in crate::stages) fn below_zero_beside(&self, beside: &Fitness, is_fractional: bool) -> Option<(&str, f64)> {
+        /// Noise about zero is within so many times what neighbors differ by.
+        const NEAR: f64 = 3.0;
+        if beside.comes_near_zero(NEAR) == Some(true) {
+            return None;
+        }
+        self.of_darks().filter(|frames| !(is_fractional && frames.are_fractional())).find_map(Frames::below_zero)
+    }
+
+    /// A dark frame most samples of which are exactly zero so far, and their share, where what it came off is far from zero everywhere.
+    pub fn at_zero(&self) -> Option<(&str, f64)> {
+        self.at_zero_beside(&self.fitness)
+    }
+
+    /// The same where what it came off looked so.
+    pub(in crate::stages) fn at_zero_beside(&self, beside: &Fitness) -> Option<(&str, f64)> {
+        /// Of black 0 light is farther off, in what neighbors differ by, from some 2000 electrons on.
+        const FAR: f64 = 40.0;
+        if beside.comes_near_zero(FAR) != Some(false) {
+            return None;
+        }
+        self.of_darks().find_map(Frames::at_zero)
+    }
+
+    /// Averages of dark frames.
+    fn of_darks(&self) -> impl Iterator<Item = &Frames<S>> {
         let darks = self.masters.iter().zip(&self.stack.masters);
-        darks.filter(|(_, master)| master.record.kind == MasterKind::Dark).find_map(|(frames, _)| frames.below_zero())
+        darks.filter(|(_, master)| master.record.kind == MasterKind::Dark).map(|(frames, _)| frames)
+    }
+
+    /// The step that codes of what they came off lie apart by so far; 1 where they are no whole numbers.
+    pub fn step_of_frame(&self) -> f64 {
+        self.fitness.step_of_frame()
+    }
+
+    /// Whether their codes so far lie multiples of a power of two apart.
+    pub fn are_multiples_of(&self, scale: u64) -> bool {
+        self.fitness.are_darks_multiples_of(scale)
     }
 
     /// The mean of what is left of masked photosites of the frame so far, and its standard deviation, all of which may be that of whole rows;

@@ -247,6 +247,13 @@ fn check_plane(input: &FrameHeader) -> Result<()> {
         return Err(input
             .refuse(format!("a CFA plane of {width}x{height} lacks whole classes; demosaicking needs at least 2x2")));
     }
+    let flat = input.metadata.correction.as_ref().and_then(|correction| correction.flat.as_ref());
+    if flat.is_some_and(|flat| flat.means_adu.len() == 1) {
+        return Err(input.refuse(
+            "it was divided by a flat field as photosites of one class, which took the colors of the flat's light off it; correct the \
+             frame again, and tell its pattern then",
+        ));
+    }
     Ok(())
 }
 

@@ -185,6 +185,16 @@ impl<S: RowSource> FlatFrames<S> {
         }
     }
 
+    /// A dark frame of theirs that has more samples below zero so far than codes of a camera do, and their share.
+    pub fn darks_below_zero(&self) -> Option<(&str, f64)> {
+        self.darks()?.below_zero_beside(&self.fitness, self.frames.are_fractional())
+    }
+
+    /// A dark frame of theirs most samples of which are exactly zero so far, and their share.
+    pub fn darks_at_zero(&self) -> Option<(&str, f64)> {
+        self.darks()?.at_zero_beside(&self.fitness)
+    }
+
     /// Samples of theirs that were clipped so far.
     pub fn clipped(&self) -> u64 {
         self.frames.clipped() + self.darks().map_or(0, DarkFrames::clipped)
@@ -361,11 +371,18 @@ impl<S: RowSource> FlatFrames<S> {
         Ok(FlatMeans { means, photosites: counts.clone(), left_out, full: full.iter().sum(), limits, doubt })
     }
 
-    /// What is wrong with the Bayer array that they are said to be behind, where what photosites scatter by is known.
+    /// What is wrong with the array that they are said to be behind, Bayer or none, or that nothing tells, where what photosites scatter by
+    /// is known.
     fn doubt_of_array(&self, tally: &Tally) -> Option<String> {
-        let array =
-            self.head.metadata.cfa.filter(|array| array.bayer().is_some() && self.classes.period() == [2, 2])?;
-        Some(format!("{}: {}", self.head.name, tally.places()?.doubt(array)?))
+        if self.head.geometry.channels.len() > 1 {
+            return None;
+        }
+        let (name, doubt) = (&self.head.name, tally.places()?.doubt(self.head.metadata.cfa)?);
+        // Behind filters that count as none all classes have one mean.
+        let is_one = self.classes.count() == 1;
+        let lost =
+            if is_one { " Divided as photosites of one class, frames lose the colors of their light" } else { "" };
+        Some(format!("{name}: {doubt}{lost}"))
     }
 
     /// What metadata keep of them.

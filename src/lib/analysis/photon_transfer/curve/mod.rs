@@ -69,6 +69,9 @@ pub struct Curve {
     is_response_free: bool,
     /// The share of the light that signals miss their line by, beyond what they scatter by: a standard deviation.
     pub light_error: f64,
+    /// What variances of flats miss the line of the gain by beyond what they scatter by, as a share of the largest; none where that may be
+    /// chance.
+    pub gain_error: Option<f64>,
     /// What is to be said of darks whose means miss their line over time by more than they scatter, and whether it is a doubt.
     pub dark_told: Option<(String, bool)>,
     /// What means of darks miss that line by besides.
@@ -130,6 +133,7 @@ impl Curve {
             are_darks_clipped,
             is_response_free: false,
             light_error: 0.0,
+            gain_error: None,
             dark_told: None,
             dark_besides: Component::NONE,
             dark_drift: 0.0,

@@ -9,6 +9,8 @@ use crate::text::in_digits;
 impl Curve {
     /// Weights, from the first fit on at its levels; what points miss their lines by is added to what they scatter by.
     pub(super) fn weigh(&mut self) {
+        /// Less likely is beyond chance: 5 standard deviations.
+        const LEVEL: f64 = 5.7e-7;
         self.weigh_darks();
         let fitted: Vec<Point4> = self.fitted.iter().map(|&flat| self.flats[flat].clone()).collect();
         let relative = relative_scatter(&fitted);
@@ -42,6 +44,9 @@ impl Curve {
             };
             let largest = self.fitted.iter().map(|&flat| self.noise(flat).powi(2)).fold(0.0, f64::max);
             besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
+            let missed = misfit(0.0);
+            let is_beyond = missed > freedom && significance::of_chi_square(missed, freedom) < LEVEL;
+            self.gain_error = is_beyond.then(|| (besides / largest).sqrt());
             self.weights = weighted(besides).weights;
         }
         for &flat in &self.fitted {
