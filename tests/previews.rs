@@ -205,7 +205,11 @@ fn a_sheet_shows_every_frame() {
     // False colors of frames of several planes, too.
     shop.run("preview rgb.exr plane.exr --false-color -o sheet.png", &[]);
     for (line, status, said) in [
-        ("zero.bin -o a.png", BAD_USAGE, "all its samples are 0, which makes no range from black to white; name one with --range"),
+        (
+            "zero.bin -o a.png",
+            BAD_USAGE,
+            "all its samples are 0, which makes no range from black to white; name one with --range",
+        ),
         ("none.bin -o a.png", BAD_DATA, "there is nothing to show"),
         ("zero.bin none.bin --range 3,3 -o a.png", BAD_USAGE, "a range from 3 to 3 shows nothing"),
     ] {

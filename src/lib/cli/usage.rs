@@ -23,6 +23,7 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
             let hint = in_words(meant(&argument, command, words).or_else(|| near_option(&argument, command)));
             let hint = output_hint(&argument, command, words).map_or(hint, |output| format!("; {output}"));
             let hint = in_quotes(&argument, command, words).map_or(hint, |quoted| format!("; write {quoted}"));
+            let hint = if argument == "--list" { LISTS_OF_DATA.to_owned() } else { hint };
             let argument = one_dash(&argument, words).unwrap_or(&argument);
             format!("unknown option or extra argument `{argument}`{hint}")
         }
@@ -133,6 +134,9 @@ fn respelled(value: &str, command: &Command, words: &[String]) -> Option<String>
         None => format!("write {found}"),
     })
 }
+
+/// What is said of an option that lists what there is.
+const LISTS_OF_DATA: &str = "; `cyanometer list` tells the spectra, sensors and tables that come with the programs";
 
 /// Lists of numbers, of which an option that takes such takes one.
 const LISTS: [&str; 4] = ["1,2", "1,2,3", "1,2,3,4", "1,2,3,4,5,6,7,8"];
@@ -342,6 +346,10 @@ mod tests {
             // The word behind the value of an option is no part of it where it is an option itself.
             ("--sides 8x8 --expose 1", "unknown option or extra argument `--expose`; did you mean `--exposure`?"),
             ("--sides 8x8 --observer 1", "unknown option or extra argument `--observer`"),
+            (
+                "a --list",
+                "unknown option or extra argument `--list`; `cyanometer list` tells the spectra, sensors and tables that come with the programs",
+            ),
             ("--seed 5 --foo 3", "unknown option or extra argument `--foo`"),
             ("--seed 5 --sidesize 3x3", "unknown option or extra argument `--sidesize`; did you mean `--sides`?"),
             (

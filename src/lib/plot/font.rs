@@ -14,6 +14,17 @@ fn glyph(c: char) -> GlyphId {
     FACE.glyph_index(c).or_else(|| FACE.glyph_index('\u{FFFD}')).unwrap_or_default()
 }
 
+/// The characters of a text that the font lacks, each once.
+pub fn lacking(text: &str) -> Vec<char> {
+    let mut found: Vec<char> = Vec::new();
+    for c in text.chars().filter(|c| !c.is_whitespace() && FACE.glyph_index(*c).is_none()) {
+        if !found.contains(&c) {
+            found.push(c);
+        }
+    }
+    found
+}
+
 fn advance(glyph: GlyphId) -> f64 {
     f64::from(FACE.glyph_hor_advance(glyph).unwrap_or(0))
 }

@@ -12,7 +12,7 @@ use crate::color::ramp::ramp;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
-use crate::plot::{Pixels, Scale, ScaleBar, Tile, sheet};
+use crate::plot::{Pixels, Scale, ScaleBar, Tile, lacking, sheet};
 use crate::stream::RowSource;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -141,6 +141,7 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
     };
     let scale = scale(&settings, reduction.in_words(choice.filter), &shown);
     if let Some(words) = settings.caption.filter(|words| !words.is_empty()) {
+        doubt_of_caption(&words);
         return Ok(shown.tile(String::new(), words.lines().map(str::to_owned).chain(scale).collect()));
     }
     let mut caption = vec![planes::stage(&frame, &choice, [region.width, region.height])];
@@ -156,6 +157,19 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
     }
     caption.extend(scale);
     Ok(shown.tile(frame.name, caption))
+}
+
+/// Warns of a caption that is not written as it was given.
+fn doubt_of_caption(words: &str) {
+    let lacking = lacking(words);
+    if !lacking.is_empty() {
+        let shown: Vec<String> = lacking.iter().map(char::to_string).collect();
+        let problem = "the font of pictures lacks them, and a question mark stands there";
+        register::doubt(format!(
+            "the caption has characters such as {}: {problem}",
+            shown[..shown.len().min(8)].join(" ")
+        ));
+    }
 }
 
 /// What black, white and a pixel of the picture are.
