@@ -200,12 +200,6 @@ fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
             "unknown key `readout.prnu_percent`; here it is `prnu`, a fraction of 1, per cent over 100",
         ),
         (&FLAT.to_owned(), "sensor/1", "sensor/2", "unknown key `width`; did you mean `readout.width`?"),
-        (
-            &FLAT.to_owned(),
-            "cfa: gbrg\n",
-            "cfa: GBRG\nbit_depth: 3\n",
-            "unknown key `bit_depth`; here it is `bits`, bits of the converter",
-        ),
         (&FLAT.to_owned(), "cfa: gbrg", "cfa: monochrome", "`cfa` is `monochrome`; known are"),
         (&parts, "cfa: gbrg", "cfa: rgbw", "in `readout.cfa`, `rgbw` is no filter array; one is rggb"),
         (&parts, "bits: 14", "bits: 0", "`bits` is 0; it must be 1 to 16"),

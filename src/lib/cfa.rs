@@ -396,7 +396,15 @@ mod tests {
                 [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| pattern.class(x, y).letter()).concat().to_lowercase();
             assert_eq!(corner, pattern.name());
             assert_eq!(pattern.name().parse(), Ok(pattern));
+            // In any case in files, too.
+            let upper = pattern.name().to_uppercase();
+            assert_eq!(serde_yaml::from_str::<CfaPattern>(&upper).unwrap(), pattern);
         }
+        let complaint = serde_yaml::from_str::<CfaPattern>("rgbg").unwrap_err().to_string();
+        assert!(
+            complaint.contains("unknown variant `rgbg`, expected one of `rggb`, `bggr`, `grbg`, `gbrg`"),
+            "{complaint}"
+        );
     }
 
     #[test]

@@ -53,7 +53,7 @@ fn in_another_unit(typed: &str, known: &[String]) -> Option<String> {
     let ending = OTHER_UNITS.into_iter().find(|end| typed.ends_with(end)).or_else(|| written::unit_ending(typed))?;
     let stem = &typed[..typed.len() - ending.len()];
     let is_so = |key: &&String| {
-        let own = written::unit_ending(key).map_or("", |end| end);
+        let own = written::unit_ending(key).unwrap_or_default();
         written::unit_of_key(key).is_some() && key.strip_suffix(own) == Some(stem)
     };
     // Of two the one by time goes with another by time.

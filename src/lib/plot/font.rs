@@ -113,6 +113,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn characters_without_a_glyph_are_told_once() {
+        assert_eq!(lacking("a 漢b漢"), ['漢']);
+        assert!(lacking("ΔE*ab / cd m⁻²").is_empty());
+    }
+
+    #[test]
     fn the_font_has_the_characters_of_labels() {
         let needed = "0123456789−+±×·°%/()[]*=<>≤≥≈→∞√…–—’⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺₀₁₂₃₄₅₆₇₈₉αβγδΔεηκλΛμνρσΣτφΦχΩµäöüßéèñçø";
         for c in needed.chars().chain(' '..='~') {

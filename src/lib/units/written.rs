@@ -7,7 +7,7 @@ use crate::text::in_decimals;
 type Units = &'static [(&'static [&'static str], f64)];
 
 /// What a key ends in, the unit that its numbers are in, and the units that are written there, with what they are of it.
-const KINDS: [(&str, &str, Units); 14] = [
+const KINDS: [(&str, &str, Units); 15] = [
     (
         "_na_per_cm2",
         "nA/cm2",
@@ -26,6 +26,7 @@ const KINDS: [(&str, &str, Units); 14] = [
             (&["e-/h", "e/h", "e-/px/h", "e/px/h"], 1.0 / 3600.0),
         ],
     ),
+    ("e_per_adu", "e-/ADU", &[(&["e-/ADU", "e/ADU", "e-/DN", "e/DN"], 1.0)]),
     ("adu_per_e", "ADU/e-", &[(&["ADU/e-", "ADU/e", "DN/e-", "DN/e"], 1.0)]),
     ("_um", "um", &[(&["um", "micron", "microns"], 1.0), (&["nm"], 1e-3), (&["mm"], 1e3), (&["m"], 1e6)]),
     ("_nm", "nm", &[(&["nm"], 1.0), (&["um", "micron", "microns"], 1e3), (&["angstrom", "Å"], 0.1)]),
@@ -89,7 +90,7 @@ pub fn respelled(key: &str, text: &str) -> Option<String> {
     let (value, end) = ends.filter(|end| *end < text.len()).find_map(|end| Some((number(&text[..end])?, end)))?;
     let (bare, written) = (text[..end].trim(), text[end..].trim());
     let Some((unit, others)) = kind(key) else {
-        return Some(format!("it is a number without a unit, not with `{written}`"));
+        return Some(format!("it is a number in the unit of the key, without `{written}`"));
     };
     let is_inverse =
         unit == "ADU/e-" && ["e-/adu", "e/adu", "e-/dn", "e/dn"].contains(&plain(written).to_lowercase().as_str());
@@ -165,7 +166,7 @@ mod tests {
             ("prnu", "8000 ppm", "write 0.008, which is 8000 ppm as a fraction of 1"),
             ("dcnu", "2 e-", "it is a fraction of 1, which `e-` is not"),
             ("bits", "12 bit", "write 12, without `bit`, the unit of the key"),
-            ("f_number", "8 m", "it is a number without a unit, not with `m`"),
+            ("f_number", "8 m", "it is a number in the unit of the key, without `m`"),
         ] {
             assert_eq!(respelled(key, text).as_deref(), Some(wanted), "{key}: {text}");
         }

@@ -79,7 +79,7 @@ pub(super) fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
 }
 
 /// Over which groups no law is drawn as full well clips them; empty where over all.
-fn of_clipped(groups: &[Bins]) -> String {
+fn of_clipped(groups: &[Bins<'_>]) -> String {
     let is_clipped = |bins: &&Bins| bins.group.predicted.as_ref().is_some_and(|foreseen| foreseen.is_clipped);
     let names: Vec<&str> = groups.iter().filter(is_clipped).map(|bins| bins.group.name.as_str()).collect();
     if names.is_empty() { String::new() } else { format!("no law drawn over {}: full well clips it", names.join(", ")) }

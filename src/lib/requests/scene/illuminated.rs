@@ -138,11 +138,11 @@ impl Scene {
 
     /// What a user should know of a scene of a picture; `luminances` of its white are the one chosen and the one that its file tells.
     fn tell(&self, header: &FrameHeader, illuminant: &str, luminances: [Option<f64>; 2], found: &mut Found) {
+        /// More channels are not named one by one.
+        const MOST_NAMED: usize = 16;
         let [chosen, told] = luminances;
         let white_luminance = chosen.or(told).unwrap_or(WHITE_LUMINANCE);
         let name = &header.name;
-        /// More channels are not named one by one.
-        const MOST_NAMED: usize = 16;
         let others = &header.geometry.channels[3..];
         if !others.is_empty() {
             let named = match others {
