@@ -175,13 +175,13 @@ fn near_value(typed: &str, list: &str) -> Option<String> {
 fn near<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
     /// So many letters are enough to know a name by.
     const LETTERS: usize = 4;
-    let begins = |long: &str, short: &str| short.chars().count() >= LETTERS && long.starts_with(short);
-    let longest_within = known.iter().filter(|name| begins(typed, name)).max_by_key(|name| name.len());
-    let shortest_around = || known.iter().filter(|name| begins(name, typed)).min_by_key(|name| name.len());
+    let begins = |long: &str, short: &str| short.len() >= LETTERS && long.starts_with(short);
+    let known = || known.iter().copied();
+    let longest_within = || known().filter(|name: &&str| begins(typed, *name)).max_by_key(|name| name.len());
+    let shortest_around = || known().filter(|name: &&str| begins(*name, typed)).min_by_key(|name| name.len());
     // A letter of three may differ, of eight three.
     let farthest = |name: &str| (typed.chars().count().min(name.len()) + 1) / 3;
-    let few_letters = nearest(typed, known.iter().copied(), farthest);
-    few_letters.or_else(|| longest_within.or_else(shortest_around).copied())
+    nearest(typed, known(), farthest).or_else(longest_within).or_else(shortest_around)
 }
 
 /// Values as people guess them, without marks between words, and what they are here; it counts where the option has the value.

@@ -332,7 +332,11 @@ impl Metadata {
     /// What it says of the same thing in two ways that do not agree: a warning each.
     pub fn contradictions(&self) -> Vec<String> {
         let mut known = QuantityKind::ALL.iter().filter(|kind| **kind != QuantityKind::Unspecified);
+        // Other programs' names of units, of samples that are known.
+        let is_counted =
+            matches!(self.quantity, QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu);
         let unit = match self.unit.to_lowercase().as_str() {
+            _ if !is_counted => self.unit.as_str(),
             "e" | "e⁻" | "electron" | "electrons" => QuantityKind::Electrons.unit(),
             "adu" | "dn" | "lsb" | "counts" => QuantityKind::Adu.unit(),
             _ => self.unit.as_str(),

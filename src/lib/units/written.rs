@@ -89,6 +89,9 @@ pub fn respelled(key: &str, text: &str) -> Option<String> {
     let ends = text.char_indices().map(|(place, c)| place + c.len_utf8()).rev();
     let (value, end) = ends.filter(|end| *end < text.len()).find_map(|end| Some((number(&text[..end])?, end)))?;
     let (bare, written) = (text[..end].trim(), text[end..].trim());
+    if !written.starts_with(|c: char| c.is_alphabetic() || ['%', '‰', '°'].contains(&c)) {
+        return None;
+    }
     let Some((unit, others)) = kind(key) else {
         return Some(format!("it is a number in the unit of the key, without `{written}`"));
     };

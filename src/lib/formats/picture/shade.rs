@@ -268,7 +268,9 @@ fn about_inverse(reduced: &Reduced, plane: usize, count: f64) -> (f64, f64) {
 
 /// The number that all finite samples are.
 pub(super) fn only_value(reduced: &Reduced) -> Option<f64> {
-    reduced.quantiles_of_all([0.0, 1.0]).filter(|[low, high]| low == high).map(|[value, _]| value)
+    let mut finite = reduced.samples.iter().copied().filter(|sample| sample.is_finite());
+    let first = finite.next()?;
+    finite.all(|sample| sample == first).then(|| f64::from(first))
 }
 
 /// A complaint of a frame without numbers.
