@@ -228,6 +228,8 @@ fn sensor_files_are_told_what_to_write() {
             "is `0.8%`, not a number (line 25, column 7); write it as a fraction of 1, 0.008",
         ),
         ("bits: 12", "bits: 12.0", "; write 12"),
+        ("bits: 12", "bit_depth: 12", "here it is `bits`, bits of the converter"),
+        ("temperature_k: 333", "temperature_k: 60 C", "; write 333.15, which is 60 C in K"),
         ("bits: 12", "bits:12", "a key lacks its colon, or the blank behind it, at or above this place"),
         ("adu_per_e:", "e_per_adu:", "unknown key `e_per_adu`; here it is `adu_per_e`, its inverse"),
         (

@@ -228,6 +228,14 @@ fn saturated_samples_do_not_make_the_scale() {
     assert!(!plain.contains("in its highest bin"));
     assert!(words(&saturated).contains(" % of B in its highest bin, beyond the axis"));
     assert!(laws(&plain) > laws(&saturated), "{} {}", laws(&plain), laws(&saturated));
+    // Electrons at full well are spread by read noise: no heap, but no normal law either.
+    assert!(shop.attempt("measure noisy.exr --plot full.svg", &[]).status.success());
+    let full = String::from_utf8(shop.bytes("full.svg")).unwrap();
+    assert!(words(&full).contains("no law drawn over B: full well clips it"), "{}", words(&full));
+    figure("8000,12000,20000");
+    assert!(shop.attempt("measure noisy.exr --plot open.svg", &[]).status.success());
+    let open = String::from_utf8(shop.bytes("open.svg")).unwrap();
+    assert!(laws(&open) > laws(&full) && !words(&open).contains("no law"), "{}", words(&open));
 }
 
 /// A law of which hot photosites make the spread shows no other sample, and is not drawn; where they make next to nothing of it, it is.

@@ -188,6 +188,37 @@ fn what_is_not_finite_is_seen() {
     shop.run("preview --raw 1x1:f32le one.bin --false-color -o a.png", &[]);
 }
 
+/// A frame that makes no picture, or no range, does not take the others of a sheet with it; alone it is told what would show.
+#[test]
+fn a_sheet_shows_every_frame() {
+    let shop = Workshop::with_frames();
+    for (name, sample) in [("zero", 0.0_f32), ("none", f32::NAN)] {
+        let bytes: Vec<u8> = (0..20 * 10).flat_map(|_| sample.to_le_bytes()).collect();
+        std::fs::write(shop.path(&format!("{name}.bin")), bytes).unwrap();
+    }
+    let raw = "preview --raw 20x10:f32le";
+    shop.run(&format!("{raw} --columns 2 zero.bin none.bin -o sheet.png"), &[]);
+    let pixels = Picture::read(&shop, "sheet.png").pixels;
+    for color in [[0x80; 3], [0xcc, 0x79, 0xa7]] {
+        assert!(pixels.iter().filter(|pixel| **pixel == color).count() >= 20 * 10, "{color:?}");
+    }
+    // False colors of frames of several planes, too.
+    shop.run("preview rgb.exr plane.exr --false-color -o sheet.png", &[]);
+    for (line, status, said) in [
+        (
+            "zero.bin -o a.png",
+            BAD_USAGE,
+            "all its samples are 0, which makes no range from black to white; name one with --range",
+        ),
+        ("none.bin -o a.png", BAD_DATA, "there is nothing to show"),
+        ("zero.bin none.bin --range 3,3 -o a.png", BAD_USAGE, "a range from 3 to 3 shows nothing"),
+    ] {
+        let output = shop.attempt(&format!("{raw} {line}"), &[]);
+        let complaint = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(status) && complaint.contains(said), "{line}: {complaint}");
+    }
+}
+
 /// A sheet holds the picture of each frame, in the order given; a frame of several scenes is told apart by its gray.
 #[test]
 fn a_sheet_shows_frames_in_their_order() {

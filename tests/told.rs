@@ -638,9 +638,10 @@ fn a_comment_that_contradicts_the_heading_is_told() {
 fn edited_sidecars_are_told_of() {
     let shop = Workshop::with_frames();
     let sidecar = fs::read_to_string(shop.path("codes.exr.yaml")).unwrap();
-    let edits: [(&str, &str, &str); 3] = [
+    let edits: [(&str, &str, &str); 4] = [
         ("white_level_adu", "white_levl_adu", "unknown key `white_levl_adu`; did you mean `white_level_adu`?"),
         ("unit: ADU", "unit: e-", "its unit is `e-`, but that of its quantity, ADU, is `ADU`"),
+        ("unit: ADU", "unit: electrons", "its unit is `electrons`, but that of its quantity, ADU, is `ADU`"),
         ("black_level_adu:", "black_level_adu: 0 # ", "its black level, 0 ADU, is below the bias of its converter, "),
     ];
     assert_eq!(shop.said("measure codes.exr", 0), "");

@@ -50,7 +50,7 @@ impl Class {
 /// assert_eq!(pattern.row_classes([3, 1], 0), [Class::Blue, Class::Green]);
 /// # Ok::<(), String>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CfaPattern {
     /// R G / G B
@@ -101,6 +101,26 @@ impl CfaPattern {
 impl fmt::Display for CfaPattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for CfaPattern {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        /// Finds a name in any case inside the deserializer, which knows the place that a complaint is about.
+        struct Find;
+        impl Visitor<'_> for Find {
+            type Value = CfaPattern;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a Bayer pattern, such as rggb")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<CfaPattern, E> {
+                let names = CfaPattern::ALL.map(|pattern| format!("`{pattern}`")).join(", ");
+                text.parse().map_err(|_| E::custom(format_args!("unknown variant `{text}`, expected one of {names}")))
+            }
+        }
+        deserializer.deserialize_str(Find)
     }
 }
 
@@ -376,7 +396,15 @@ mod tests {
                 [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| pattern.class(x, y).letter()).concat().to_lowercase();
             assert_eq!(corner, pattern.name());
             assert_eq!(pattern.name().parse(), Ok(pattern));
+            // In any case in files, too.
+            let upper = pattern.name().to_uppercase();
+            assert_eq!(serde_yaml::from_str::<CfaPattern>(&upper).unwrap(), pattern);
         }
+        let complaint = serde_yaml::from_str::<CfaPattern>("rgbg").unwrap_err().to_string();
+        assert!(
+            complaint.contains("unknown variant `rgbg`, expected one of `rggb`, `bggr`, `grbg`, `gbrg`"),
+            "{complaint}"
+        );
     }
 
     #[test]

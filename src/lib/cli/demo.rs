@@ -5,7 +5,7 @@ use super::show;
 use crate::error::{Error, Result};
 use crate::formats::atomic::AtomicFile;
 use std::fs;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 use std::process::{Child, Stdio};
 
@@ -82,7 +82,15 @@ pub fn run(directory: &Path) -> Result<()> {
 }
 
 fn say(text: &str) -> Result<()> {
-    show(|| std::io::stdout().write_all(text.as_bytes()))
+    show(|| io::stdout().write_all(text.as_bytes()))
+}
+
+/// A program that does not start: one that is there lacks what its input comes from.
+fn not_run(program: &Path, error: io::Error) -> Error {
+    match error.kind() {
+        io::ErrorKind::NotFound if program.is_file() => Error::disk("/dev/null", "open", error),
+        _ => Error::disk(&program.to_string_lossy(), "run", error),
+    }
 }
 
 /// Runs the programs of a line at the same time, each reading what the one before it writes.
@@ -96,7 +104,8 @@ fn pipeline(line: &str, directory: &Path) -> Result<()> {
         let mut command = programs::command(words.next().unwrap_or_default())?;
         command.args(words).current_dir(directory).stdin(before.map_or_else(Stdio::null, Stdio::from));
         command.stdout(if is_last { Stdio::inherit() } else { Stdio::piped() });
-        running.push(command.spawn().map_err(|e| Error::disk(&command.get_program().to_string_lossy(), "run", e))?);
+        let program = Path::new(command.get_program()).to_owned();
+        running.push(command.spawn().map_err(|e| not_run(&program, e))?);
     }
     let mut failed = None;
     for (command, mut child) in commands.into_iter().zip(running) {

@@ -4,6 +4,7 @@
 
 use super::advice::output_hint;
 use crate::formats::foreign::number_complaint;
+use crate::names::nearest;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
@@ -16,27 +17,27 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
     };
     let argument = context(ContextKind::InvalidArg).unwrap_or_default();
     let value = context(ContextKind::InvalidValue).unwrap_or_default();
-    let suggestion = context(ContextKind::SuggestedArg).or_else(|| context(ContextKind::SuggestedValue));
-    let hint = suggestion.map_or(String::new(), |s| format!("; did you mean `{s}`?"));
+    let in_words = |meant: Option<String>| meant.map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
     let problem = match error.kind() {
         ErrorKind::UnknownArgument => {
-            let meant = meant(&argument, command, words).map(|meant| format!("; did you mean `{meant}`?"));
-            let hint = meant.unwrap_or(hint);
+            let hint = in_words(meant(&argument, command, words).or_else(|| near_option(&argument, command)));
             let hint = output_hint(&argument, command, words).map_or(hint, |output| format!("; {output}"));
             let hint = in_quotes(&argument, command, words).map_or(hint, |quoted| format!("; write {quoted}"));
+            let hint = if argument == "--list" { LISTS_OF_DATA.to_owned() } else { hint };
             let argument = one_dash(&argument, words).unwrap_or(&argument);
             format!("unknown option or extra argument `{argument}`{hint}")
         }
         ErrorKind::InvalidValue if value.is_empty() => format!("{argument} needs a value"),
         ErrorKind::InvalidValue => {
             let choices = context(ContextKind::ValidValue);
+            let hint = in_words(choices.as_ref().and_then(|list| near_value(&value, list)));
             let choices = choices.map_or(String::new(), |list| format!("; it is one of {list}"));
             format!("`{value}` is no value for {argument}{choices}{hint}")
         }
         ErrorKind::ValueValidation => {
             let reason = std::error::Error::source(error)
                 .map_or(String::new(), |source| format!(": {}", number_complaint(&source.to_string())));
-            let hint = respelled(&value, command, words).map_or(String::new(), |text| format!("; write {text}"));
+            let hint = respelled(&value, command, words).map_or(String::new(), |text| format!("; {text}"));
             format!("`{value}` is no value for {argument}{reason}{hint}")
         }
         ErrorKind::MissingRequiredArgument if is_always_needed(&argument, command) => {
@@ -71,7 +72,7 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
 
 /// An option with its value in quotes, where an argument too many is part of that: `--radiance-unit W m-2 sr-1 nm-1`.
 fn in_quotes(argument: &str, command: &Command, words: &[String]) -> Option<String> {
-    let place = words.iter().position(|word| word == argument)?;
+    let place = words.iter().position(|word| word == argument && !word.starts_with('-'))?;
     let option = words.get(place.checked_sub(2)?).filter(|word| word.starts_with("--") && !word.contains('='))?;
     let rest = words[place..].iter().take_while(|word| !word.starts_with('-'));
     let value = std::iter::once(&words[place - 1]).chain(rest).map(String::as_str).collect::<Vec<_>>().join(" ");
@@ -85,8 +86,9 @@ fn in_quotes(argument: &str, command: &Command, words: &[String]) -> Option<Stri
     (is_taken(&value) && !is_taken("\u{1}")).then(|| format!("{option} '{value}'"))
 }
 
-/// A value that is none as it would be taken: with points for decimal commas, commas for semicolons between numbers, the letter x for
-/// another sign between the sides of a size; both where commas may be marks of thousands; nothing where none of these makes a value of it.
+/// What to write for a value that is none, as it would be taken: with points for decimal commas, commas for semicolons between numbers, the
+/// letter x for another sign between the sides of a size; both where commas may be marks of thousands; nothing where none of these makes a
+/// value of it. Where commas part the numbers of a list they are no others until its reader says so.
 fn respelled(value: &str, command: &Command, words: &[String]) -> Option<String> {
     let points = value.replace(',', ".");
     // `0,5,1,5`: every second comma parts numbers.
@@ -122,8 +124,22 @@ fn respelled(value: &str, command: &Command, words: &[String]) -> Option<String>
     let found = candidates.into_iter().find(|candidate| candidate != value && !takes_any && is_taken(candidate))?;
     // `1,753` may be 1753 as well.
     let whole = without_thousands(value).filter(|whole| is_taken(whole));
-    Some(whole.map_or(found.clone(), |whole| format!("{whole}, or {found} where that is meant")))
+    let is_list = !value.contains(';') && value.contains(',');
+    let takes_lists = is_list && LISTS.iter().any(|list| is_taken(&(*list).to_owned()));
+    Some(match whole {
+        _ if takes_lists && found.contains(',') => format!("where its commas are decimal, write {found}"),
+        Some(whole) if takes_lists => format!("where one number is meant, write {whole} or {found}"),
+        None if takes_lists && !found.contains('x') => format!("where one number is meant, write {found}"),
+        Some(whole) => format!("write {whole}, or {found} where that is meant"),
+        None => format!("write {found}"),
+    })
 }
+
+/// What is said of an option that lists what there is.
+const LISTS_OF_DATA: &str = "; `cyanometer list` tells the spectra, sensors and tables that come with the programs";
+
+/// Lists of numbers, of which an option that takes such takes one.
+const LISTS: [&str; 4] = ["1,2", "1,2,3", "1,2,3,4", "1,2,3,4,5,6,7,8"];
 
 /// Numbers without marks of thousands, where all commas can be such, alone or between numbers: `8,000,12,000`.
 fn without_thousands(value: &str) -> Option<String> {
@@ -139,8 +155,55 @@ fn without_thousands(value: &str) -> Option<String> {
     are_thousands.then(|| parts.chunks(2).map(<[&str]>::concat).collect::<Vec<_>>().join(","))
 }
 
+/// The option whose name is near to one that there is not: one begins with the other, or few letters differ.
+fn near_option(argument: &str, command: &Command) -> Option<String> {
+    let typed = argument.strip_prefix("--")?;
+    let names = command.get_arguments().filter(|option| !option.is_hide_set()).filter_map(clap::Arg::get_long);
+    let found = near(typed, &names.collect::<Vec<_>>())?;
+    Some(format!("--{found}"))
+}
+
+/// The value of a list between commas that a typed one is another's name for, or is near to.
+fn near_value(typed: &str, list: &str) -> Option<String> {
+    let values: Vec<&str> = list.split(", ").collect();
+    let bare = typed.to_lowercase().replace(['_', '-', ' '], "");
+    let guess = GUESSED_VALUES.iter().find(|(guess, value)| *guess == bare && values.contains(value));
+    guess.map(|(_, value)| *value).or_else(|| near(&typed.to_lowercase(), &values)).map(str::to_owned)
+}
+
+/// The known name that is near to a typed one.
+fn near<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
+    /// So many letters are enough to know a name by.
+    const LETTERS: usize = 4;
+    let begins = |long: &str, short: &str| short.len() >= LETTERS && long.starts_with(short);
+    let known = || known.iter().copied();
+    let longest_within = || known().filter(|name: &&str| begins(typed, *name)).max_by_key(|name| name.len());
+    let shortest_around = || known().filter(|name: &&str| begins(*name, typed)).min_by_key(|name| name.len());
+    // A letter of three may differ, of eight three.
+    let farthest = |name: &str| (typed.chars().count().min(name.len()) + 1) / 3;
+    nearest(typed, known(), farthest).or_else(longest_within).or_else(shortest_around)
+}
+
+/// Values as people guess them, without marks between words, and what they are here; it counts where the option has the value.
+const GUESSED_VALUES: [(&str, &str); 14] = [
+    ("readnoise", "ron"),
+    ("readoutnoise", "ron"),
+    ("read", "ron"),
+    ("readout", "ron"),
+    ("shotnoise", "ssn"),
+    ("shot", "ssn"),
+    ("photonnoise", "ssn"),
+    ("photonshotnoise", "ssn"),
+    ("darkcurrent", "dcsn"),
+    ("darkcurrentnoise", "dcsn"),
+    ("darkshotnoise", "dcsn"),
+    ("darknoise", "dcsn"),
+    ("hotpixel", "hot_pixels"),
+    ("hotpixels", "hot_pixels"),
+];
+
 /// Options as people guess them, and what they are here; it counts where the program has the option.
-const GUESSES: [(&str, &str); 22] = [
+const GUESSES: [(&str, &str); 24] = [
     ("aperture", "--f-number"),
     ("fnumber", "--f-number"),
     ("time", "--exposure"),
@@ -162,6 +225,8 @@ const GUESSES: [(&str, &str); 22] = [
     ("bayer", "--pattern"),
     ("ccm", "--matrix"),
     ("illuminant", "--white"),
+    ("whitepoint", "--white"),
+    ("white-point", "--white"),
     ("no-noise", "--without"),
 ];
 
@@ -220,6 +285,11 @@ mod tests {
             .arg(Arg::new("share").long("share").short('f').value_parser(clap::value_parser!(f64)))
             .arg(Arg::new("sides").long("sides").value_parser(crate::requests::values::size))
             .arg(Arg::new("three").long("three").value_parser(crate::requests::values::three_numbers))
+            .arg(Arg::new("unit").long("radiance-unit").value_parser(crate::requests::values::radiance_unit))
+            .arg(Arg::new("black").long("black").value_parser(crate::requests::values::black_level))
+            .arg(Arg::new("without").long("without").value_parser(["dcsn", "ssn", "ron", "row_noise"]))
+            .arg(Arg::new("exposure").long("exposure"))
+            .arg(Arg::new("free").long("noise-free").action(ArgAction::SetTrue))
             .arg(Arg::new("size").long("size").num_args(2))
             .arg(Arg::new("dark").long("dark").action(ArgAction::SetTrue).conflicts_with("seed"))
             .arg(Arg::new("level").long("level").num_args(1).require_equals(true))
@@ -227,6 +297,13 @@ mod tests {
             .arg(Arg::new("clip").long("clip").action(ArgAction::SetTrue).requires("dark"))
             .arg(Arg::new("kappa").long("kappa").action(ArgAction::SetTrue).requires("any"))
             .group(ArgGroup::new("any").args(["seed", "method"]).multiple(true))
+    }
+
+    fn two_of_black(value: &str, hint: &str) -> String {
+        let hint = if hint.is_empty() { String::new() } else { format!("; {hint}") };
+        format!(
+            "`{value}` is no value for --black <black>: give a number, or four between commas for the 2x2 sites row by row{hint}"
+        )
     }
 
     #[test]
@@ -260,7 +337,32 @@ mod tests {
             ),
             (
                 "--three 1,5,2,5,3,5",
-                "`1,5,2,5,3,5` is no value for --three <three>: give three numbers between commas; write 1.5,2.5,3.5",
+                "`1,5,2,5,3,5` is no value for --three <three>: give three numbers between commas; where its commas are decimal, write 1.5,2.5,3.5",
+            ),
+            ("--black 64,5", two_of_black("64,5", "where one number is meant, write 64.5").as_str()),
+            ("--black 64,640", two_of_black("64,640", "where one number is meant, write 64640 or 64.640").as_str()),
+            ("--black 64;5", two_of_black("64;5", "").as_str()),
+            ("--black 1,2,3", two_of_black("1,2,3", "").as_str()),
+            // The word behind the value of an option is no part of it where it is an option itself.
+            ("--sides 8x8 --expose 1", "unknown option or extra argument `--expose`; did you mean `--exposure`?"),
+            ("--sides 8x8 --observer 1", "unknown option or extra argument `--observer`"),
+            (
+                "a --list",
+                "unknown option or extra argument `--list`; `cyanometer list` tells the spectra, sensors and tables that come with the programs",
+            ),
+            ("--seed 5 --foo 3", "unknown option or extra argument `--foo`"),
+            ("--seed 5 --sidesize 3x3", "unknown option or extra argument `--sidesize`; did you mean `--sides`?"),
+            (
+                "a --radiance-unit W m-2 sr-1 nm-1",
+                "unknown option or extra argument `m-2`; write --radiance-unit 'W m-2 sr-1 nm-1'",
+            ),
+            (
+                "--without readnoise",
+                "`readnoise` is no value for --without <without>; it is one of dcsn, ssn, ron, row_noise; did you mean `ron`?",
+            ),
+            (
+                "--without poisson",
+                "`poisson` is no value for --without <without>; it is one of dcsn, ssn, ron, row_noise",
             ),
             (
                 "--sides 64×48",

@@ -5,6 +5,7 @@
 
 use crate::error::Error;
 use crate::text::in_decimals;
+use crate::units::written;
 use exr::error::Error as ExrError;
 use image::ImageError;
 use std::io;
@@ -195,22 +196,20 @@ fn misfit(text: &str) -> Option<String> {
         }
         "data did not match any variant" => format!("{key} has none of the forms that are read{place}"),
         _ => {
-            let hint = remedy(found, expected).map_or(String::new(), |hint| format!("; {hint}"));
+            let hint = remedy(path, found, expected).map_or(String::new(), |hint| format!("; {hint}"));
             format!("{key} is {}, not {}{place}{hint}", given(found), wanted(expected))
         }
     })
 }
 
-/// What to write instead of a value that `serde` found, where that can be told: a number with a comma, a unit, a per cent sign or quotes,
+/// What to write at a key instead of a value that `serde` found, where that can be told: a number with a comma, a unit, a per cent sign or quotes,
 /// a name of a file where keys are wanted.
-fn remedy(found: &str, expected: &str) -> Option<String> {
+fn remedy(path: &str, found: &str, expected: &str) -> Option<String> {
     let text = found.strip_prefix("string \"").and_then(|text| text.strip_suffix('"'));
     match (text, expected) {
         (Some(text), "f32" | "f64" | "u8" | "u16" | "u32" | "u64" | "usize") => {
             let is_number = |text: &str| text.parse::<f64>().is_ok_and(f64::is_finite);
             let share = text.strip_suffix('%').map(str::trim).and_then(|text| text.parse::<f64>().ok());
-            let end = text.rfind(|c: char| c.is_ascii_digit()).map_or(0, |last| last + 1);
-            let (number, unit) = text.split_at(end);
             let point = text.replacen(',', ".", 1);
             let is_whole = !expected.starts_with('f');
             match share {
@@ -222,10 +221,7 @@ fn remedy(found: &str, expected: &str) -> Option<String> {
                     whole => format!("write {whole}"),
                 }),
                 None if is_number(&point) => Some(format!("write {point}")),
-                None if is_number(number) => {
-                    Some(format!("write {number}, in the unit of the key, without `{}`", unit.trim()))
-                }
-                None => None,
+                None => written::respelled(path, text),
             }
         }
         (None, "u8" | "u16" | "u32" | "u64" | "usize") => {
@@ -449,7 +445,7 @@ mod tests {
             ("bits: 12.0\n", "`bits` is `12.0`, not a whole number from 0 on (line 1, column 7); write 12"),
             (
                 "bits: 12 bit\n",
-                "`bits` is `12 bit`, not a whole number from 0 on (line 1, column 7); write 12, in the unit of the key, without `bit`",
+                "`bits` is `12 bit`, not a whole number from 0 on (line 1, column 7); write 12, without `bit`, the unit of the key",
             ),
             ("bits: -1\n", "`bits` is `-1`, not a whole number from 0 on (line 1, column 7)"),
             ("bits: [1]\n", "`bits` is a list, not a whole number from 0 on (line 1, column 7)"),
@@ -498,7 +494,7 @@ mod tests {
 
     #[test]
     fn values_of_yaml_are_told_as_they_should_be() {
-        let told = |text: &str, expected| remedy(&format!("string \"{text}\""), expected);
+        let told = |text: &str, expected| remedy("full_well_e", &format!("string \"{text}\""), expected);
         for (text, expected, wanted) in [
             ("15,7", "f64", Some("write 15.7")),
             ("32,000", "f64", Some("write 32000, or 32.000 where that is meant")),
@@ -508,8 +504,9 @@ mod tests {
             ("0,125", "f64", Some("write 0.125")),
             ("1234,567", "f64", Some("write 1234.567")),
             ("12,3456", "f64", Some("write 12.3456")),
-            ("15.7 e-", "f64", Some("write 15.7, in the unit of the key, without `e-`")),
-            ("33ms", "f64", Some("write 33, in the unit of the key, without `ms`")),
+            ("15.7 e-", "f64", Some("write 15.7, without `e-`, the unit of the key")),
+            ("33ms", "f64", Some("it is a number in e-, which `ms` is not")),
+            ("40k", "f64", Some("write 40000, which is 40k in e-")),
             ("0.8%", "f64", Some("write it as a fraction of 1, 0.008")),
             ("1.5", "f64", Some("leave out its quotes")),
             ("qe.csv", "struct CurveFile", Some("a file is named so: {file: qe.csv}")),

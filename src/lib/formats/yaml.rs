@@ -185,6 +185,13 @@ fn parse_plain_sensor(name: &str, bytes: &[u8], raw: &Mapping) -> Result<Sensor>
     if let Some((part, _)) = sensor_parts().iter().find(|(part, _)| raw.contains_key(*part)) {
         return Err(Error::format(name, format!("`{part}` belongs to the schema `{SENSOR_SCHEMA}`; name that one")));
     }
+    let [flat, parts] = [field_names::<FlatSensor>(), field_names::<ReadOut>()];
+    let newer = raw.keys().filter_map(Value::as_str).find(|key| parts.contains(key) && !flat.contains(key));
+    if let Some(key) = newer {
+        let problem =
+            format!("unknown key `{key}`; it is one of the schema `{SENSOR_SCHEMA}`, where it stands in `readout`");
+        return Err(Error::format(name, problem));
+    }
     parse_strict::<FlatSensor>(name, bytes).map(Sensor::from)
 }
 

@@ -332,9 +332,18 @@ impl Metadata {
     /// What it says of the same thing in two ways that do not agree: a warning each.
     pub fn contradictions(&self) -> Vec<String> {
         let mut known = QuantityKind::ALL.iter().filter(|kind| **kind != QuantityKind::Unspecified);
-        let is_of_another = known.any(|kind| kind.unit() == self.unit);
+        // Other programs' names of units, of samples that are known.
+        let is_counted =
+            matches!(self.quantity, QuantityKind::ExpectedElectrons | QuantityKind::Electrons | QuantityKind::Adu);
+        let unit = match self.unit.to_lowercase().as_str() {
+            _ if !is_counted => self.unit.as_str(),
+            "e" | "e⁻" | "electron" | "electrons" => QuantityKind::Electrons.unit(),
+            "adu" | "dn" | "lsb" | "counts" => QuantityKind::Adu.unit(),
+            _ => self.unit.as_str(),
+        };
+        let is_of_another = known.any(|kind| kind.unit() == unit);
         // One of several channels has the unit of its own.
-        let is_own = self.unit == self.quantity.unit() || self.quantity.unit().split(", ").any(|own| own == self.unit);
+        let is_own = unit == self.quantity.unit() || self.quantity.unit().split(", ").any(|own| own == unit);
         let unit = (is_of_another && !is_own).then(|| {
             format!(
                 "its unit is `{}`, but that of its quantity, {}, is `{}`",

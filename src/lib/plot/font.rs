@@ -14,6 +14,17 @@ fn glyph(c: char) -> GlyphId {
     FACE.glyph_index(c).or_else(|| FACE.glyph_index('\u{FFFD}')).unwrap_or_default()
 }
 
+/// The characters of a text that the font lacks, each once.
+pub fn lacking(text: &str) -> Vec<char> {
+    let mut found: Vec<char> = Vec::new();
+    for c in text.chars().filter(|c| !c.is_whitespace() && FACE.glyph_index(*c).is_none()) {
+        if !found.contains(&c) {
+            found.push(c);
+        }
+    }
+    found
+}
+
 fn advance(glyph: GlyphId) -> f64 {
     f64::from(FACE.glyph_hor_advance(glyph).unwrap_or(0))
 }
@@ -100,6 +111,12 @@ impl OutlineBuilder for Pen {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn characters_without_a_glyph_are_told_once() {
+        assert_eq!(lacking("a 漢b漢"), ['漢']);
+        assert!(lacking("ΔE*ab / cd m⁻²").is_empty());
+    }
 
     #[test]
     fn the_font_has_the_characters_of_labels() {

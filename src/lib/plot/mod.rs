@@ -63,6 +63,7 @@ use crate::error::Result;
 pub use figure::{
     Anchor, Arrangement, Axis, Color, Marks, Name, Note, Panel, Plot, ReferenceLine, Region, Scale, Series,
 };
+pub use font::lacking;
 pub use ruler::{end_labels, power_of_ten};
 pub use sheet::{Pixels, ScaleBar, Tile, sheet};
 

@@ -246,12 +246,16 @@ fn decade_of(value: f64) -> i32 {
     decade
 }
 
+/// Numbers of more digits than so, up to that power of ten, are plain: 1234570 beside 1234555.3.
+const MANY_DIGITS: i32 = 5;
+const MOST_PLAIN: i32 = 9;
+
 /// A number in digits down to the power of ten `unit`, beside others up to that of `magnitude`.
 fn written(value: f64, magnitude: i32, unit: i32) -> String {
     let digits = |below: i32| usize::try_from(below).unwrap_or(0);
     if value.abs() < 0.5 * 10_f64.powi(unit) {
         "0".into()
-    } else if (-3..6).contains(&magnitude) {
+    } else if (-3..6).contains(&magnitude) || (6..=MOST_PLAIN).contains(&magnitude) && magnitude - unit >= MANY_DIGITS {
         minus(&format!("{value:.*}", digits(-unit)))
     } else {
         let rounds_up = |mantissa: f64| {
@@ -423,6 +427,7 @@ mod tests {
             (4875.31, 9123.77, ["4875", "9124"]),
             (0.0, 65_535.0, ["0", "65535"]),
             (-2e9, 2e9, ["−2·10⁹", "2·10⁹"]),
+            (1_234_555.31, 1_234_576.2, ["1234555.3", "1234576.2"]),
             (1.0e-7, 1.2341e-7, ["1.000·10⁻⁷", "1.234·10⁻⁷"]),
         ] {
             assert_eq!(end_labels(low, high, false), wanted);

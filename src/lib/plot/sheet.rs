@@ -47,6 +47,8 @@ pub struct ScaleBar {
     pub colors: Vec<[u8; 3]>,
     /// The color of what is no number, and what that is called; none where there is no such pixel.
     pub missing: Option<([u8; 3], String)>,
+    /// The number that all are, and how it is written; none where they differ.
+    pub only: Option<(f64, String)>,
 }
 
 impl ScaleBar {
@@ -245,7 +247,14 @@ impl Bar {
         let height = height.max(size.of(LEAST_BAR)).round();
         let ruler = meaning.ruler();
         let most = (height / size.of(2.6 * TEXT)).clamp(3.0, 12.0);
-        let ticks = ruler.ticks_between_ends(most, size.of(LINE) / height);
+        let apart = size.of(LINE) / height;
+        let mut ticks = ruler.ticks_between_ends(most, apart);
+        if let Some((only, label)) = &meaning.only
+            && let Some(place) = ruler.place_within(*only)
+        {
+            ticks.retain(|tick| (tick.place - place).abs() >= apart);
+            ticks.push(Tick { place, label: Some(label.clone()) });
+        }
         let widest = ticks.iter().filter_map(|tick| tick.label.as_deref()).map(|label| size.width(label));
         let widest = widest.chain(meaning.missing.iter().map(|(_, name)| size.width(name))).fold(0.0, f64::max);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few pixels")]
@@ -307,8 +316,14 @@ mod tests {
     fn tile(size: [usize; 2], rgb: [u8; 3], bar: bool, caption: &[&str]) -> Tile {
         let picture = Pixels { size, rgb: rgb.repeat(size[0] * size[1]) };
         let colors = (0..=255).map(|code| [code, 0, 0]).collect();
-        let meaning =
-            ScaleBar { label: "Y / cd m⁻²".into(), range: (0.0, 10.0), scale: Scale::Linear, colors, missing: None };
+        let meaning = ScaleBar {
+            label: "Y / cd m⁻²".into(),
+            range: (0.0, 10.0),
+            scale: Scale::Linear,
+            colors,
+            missing: None,
+            only: None,
+        };
         let name = caption.first().map(|name| (*name).to_owned()).unwrap_or_default();
         let caption = caption.iter().skip(1).map(|line| (*line).to_owned()).collect();
         Tile { picture, bar: bar.then_some(meaning), name, caption }

@@ -7,6 +7,7 @@ mod heading;
 mod spectral;
 mod spelling;
 mod wavelength;
+pub mod written;
 
 pub use heading::unit_of_heading;
 pub use spectral::{OtherUnit, RadianceUnit, Stated, units_in};

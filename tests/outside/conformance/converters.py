@@ -24,7 +24,11 @@ D50_OF_PROFILES = np.array([0.9642, 1, 0.8249])
 
 
 class Refused(Exception):
-    """A converter did not take a file."""
+    """A converter did not take a file; with the status that it ended with, where it did."""
+
+    def __init__(self, text, status=None):
+        super().__init__(text)
+        self.status = status
 
 
 def linear_xyz(raw, **white):
@@ -47,7 +51,7 @@ def call(command, cwd):
     done = subprocess.run(command, cwd=cwd, capture_output=True, timeout=TIMEOUT_S, check=False)
     said = (done.stdout + done.stderr).decode(errors="replace")
     if done.returncode != 0:
-        raise Refused(f"{command[0]} ended with {done.returncode}: {said.strip().splitlines()[-1:]}")
+        raise Refused(f"{command[0]} ended with {done.returncode}: {said.strip().splitlines()[-1:]}", done.returncode)
     return said
 
 

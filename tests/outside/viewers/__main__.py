@@ -2,6 +2,7 @@
 
 import argparse
 import pathlib
+import subprocess
 import sys
 
 import numpy as np
@@ -16,6 +17,9 @@ from .viewers import VIEWERS
 # rounding and dithering, and what converters' own working spaces lose.
 SAME = 3 / 255
 
+# What `timeout` ends with where it stopped a program.
+TIMED_OUT = 124
+
 
 def main():
     parser = argparse.ArgumentParser(prog="viewers", description=__doc__)
@@ -24,10 +28,11 @@ def main():
     settings = parser.parse_args()
     directory = settings.directory.resolve()
     directory.mkdir(parents=True, exist_ok=True)
-    viewers = [viewer for viewer in VIEWERS if viewer.version()]
+    viewers = [viewer for viewer in VIEWERS if viewer.version() and not viewer.lacks()]
     for viewer in VIEWERS:
         if viewer not in viewers:
-            print(f"{viewer.name} is not installed, and left out", file=sys.stderr)
+            why = f"is run by {', '.join(viewer.lacks())}, which is missing" if viewer.version() else "is not installed"
+            print(f"{viewer.name} {why}: it is left out", file=sys.stderr)
     lines = []
     with (directory / "table.md").open("w", encoding="utf-8") as file:
         # Rows as they come: a viewer that hangs, or an end by hand, keeps those before.
@@ -48,12 +53,17 @@ def shown(viewer, frame, directory):
         return "–"
     picture = directory / f"{frame.path.stem}-{frame.path.suffix[1:]}-{viewer.name}.png"
     picture.unlink(missing_ok=True)
+    hangs = False  # Which says nothing of the file.
     try:
         call(viewer.command(frame.path, picture), directory)
     except Refused as refused:
         print(f"{viewer.name}, {frame.path.name}: {refused}", file=sys.stderr)
+        hangs = refused.status == TIMED_OUT
+    except subprocess.TimeoutExpired as late:
+        print(f"{viewer.name}, {frame.path.name}: no answer in {late.timeout:.0f} s", file=sys.stderr)
+        hangs = True
     if not picture.exists():
-        return "refused"
+        return "no answer" if hangs else "refused"
     seen = frames.patches_of_file(directory, picture.name)
     if seen.shape != frame.readings["as preview"].shape:
         return "another size"

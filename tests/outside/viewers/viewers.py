@@ -13,7 +13,7 @@ PROFILE = "srgb.icc"
 
 @dataclasses.dataclass
 class Viewer:
-    """A program: how it is called, which formats it reads, and what asks for its version."""
+    """A program: how it is called, which formats it reads, what asks for its version, and what else it is run by."""
 
     name: str
     program: str
@@ -21,9 +21,14 @@ class Viewer:
     asks: list
     pattern: str
     formats: tuple = ("exr", "tiff")
+    harness: tuple = ()
 
     def version(self):
         return said([self.program, *self.asks], self.pattern)
+
+    def lacks(self):
+        """What it is run by and is missing."""
+        return [program for program in self.harness if shutil.which(program) is None]
 
 
 def first_of(*programs):
@@ -51,7 +56,7 @@ VIEWERS = [
     # Its version stands in the name of what is behind the link; a complaint waits in a window of its own.
     Viewer("ImageJ", "readlink", lambda frame, out: ["timeout", 20, "xvfb-run", "-a", "java", "-cp", IMAGEJ, "ij.ImageJ", "-batch",
                                                      imagej_macro(out), f"{frame}|{out}"],
-           ["-f", IMAGEJ], r"ij-([\d.]+[a-z]?)\.jar", ("tiff",)),
+           ["-f", IMAGEJ], r"ij-([\d.]+[a-z]?)\.jar", ("tiff",), ("timeout", "xvfb-run", "java")),
 ]
 
 

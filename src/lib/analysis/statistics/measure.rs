@@ -63,9 +63,8 @@ pub fn measure_with_portrait(
     level: Option<f64>,
 ) -> Result<(Report, Portrait)> {
     if regions.len() > 1 {
-        return Err(
-            Error::Usage(format!("{}: a plot shows one region; name one", source.header().name)).leave_out(&["plot"])
-        );
+        let advice = "name one of these alone, or measure them without a plot";
+        return Err(Error::Usage(format!("{}: a plot shows one region; {advice}", source.header().name)));
     }
     let (report, portrait) = measure_all(laws, source, regions, saturated, equations, level, true)?;
     let portrait = portrait.ok_or_else(|| Error::Data("no portrait was made".into()))?;

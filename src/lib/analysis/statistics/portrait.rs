@@ -74,6 +74,8 @@ pub struct Foreseen {
     pub stds: Vec<f64>,
     /// Whether few samples that stand out, as those of hot photosites, make so much of the spread that no normal law shows the others.
     pub has_few_far: bool,
+    /// Whether full well clips so many electrons that no normal law shows them.
+    pub is_clipped: bool,
     /// Standard deviation of a point of each profile; none where neighbors hang together in ways that are not followed.
     pub profile_std: Option<[f64; 2]>,
     /// Correlations along x, and along y, at each lag; none as before.
@@ -103,6 +105,12 @@ pub struct Correlation {
 /// colors differ by little.
 fn is_inverse(frame: &FrameHeader, channel: &str) -> bool {
     frame.metadata.quantity == QuantityKind::Cct && channel == "CCT"
+}
+
+/// The full well of the sensor of a frame; infinite where it is not known.
+fn full_well_e(frame: &FrameHeader) -> f64 {
+    let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
+    readout.map_or(f64::INFINITY, |readout| readout.full_well_e)
 }
 
 /// The units of the channels as they are shown.
@@ -161,7 +169,9 @@ impl Portrait {
         let size = [region.width, region.height];
         let foreseen = |index: usize| {
             let prediction = prediction.filter(|_| names.len() == 3 && frame.metadata.quantity != QuantityKind::Cct)?;
-            Some(Foreseen::of(prediction, index, share(index), steps, size, frame))
+            let foreseen = Foreseen::of(prediction, index, share(index), steps, size, frame);
+            let is_clipped = frame.metadata.quantity == QuantityKind::Electrons && foreseen.reaches(full_well_e(frame));
+            Some(Foreseen { is_clipped, ..foreseen })
         };
         let is_codes = frame.metadata.quantity == QuantityKind::Adu;
         let groups = names.iter().enumerate();
@@ -294,6 +304,7 @@ impl Foreseen {
                     mean: class.moments.mean,
                     stds: vec![variance.max(0.0).sqrt()],
                     has_few_far: stands_out(class, is_codes),
+                    is_clipped: false,
                     profile_std: Some(patches.map(mean_std)),
                     correlations: Some([correlation(row), correlation(column)]),
                 }
@@ -311,10 +322,16 @@ impl Foreseen {
         if is_moved { Self { profile_std: None, correlations: None, ..foreseen } } else { foreseen }
     }
 
+    /// Whether more than about 2 % of its samples would be above a ceiling.
+    fn reaches(&self, ceiling: f64) -> bool {
+        const DEVIATIONS: f64 = 2.0;
+        self.stds.iter().any(|std| self.mean + DEVIATIONS * std > ceiling)
+    }
+
     /// Of what no more is told than its moments.
     fn of_moments(mean: f64, variance: f64) -> Self {
         let stds = vec![variance.max(0.0).sqrt()];
-        Self { mean, stds, has_few_far: false, profile_std: None, correlations: None }
+        Self { mean, stds, has_few_far: false, is_clipped: false, profile_std: None, correlations: None }
     }
 
     fn of_pixels(mixture: &PixelMoments, index: usize, patches: [[usize; 2]; 2]) -> Self {
@@ -334,6 +351,7 @@ impl Foreseen {
             mean: mixture.mean[index],
             stds: [0, 1, 2, 3].map(|phase| (of(gains::pixel(weights, phase)) + beyond).max(0.0).sqrt()).to_vec(),
             has_few_far: sites.iter().any(|site| stands_out(site, false)),
+            is_clipped: false,
             profile_std: Some(
                 patches.map(|patch| (of(gains::mean_patch_mean(weights, patch)) + common).max(0.0).sqrt()),
             ),

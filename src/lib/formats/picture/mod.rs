@@ -12,7 +12,7 @@ use crate::color::ramp::ramp;
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
 use crate::numerics::moments::Moments;
-use crate::plot::{Pixels, Scale, ScaleBar, Tile, sheet};
+use crate::plot::{Pixels, Scale, ScaleBar, Tile, lacking, sheet};
 use crate::stream::RowSource;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -104,7 +104,8 @@ pub fn write_sheet(tiles: Vec<Tile>, columns: usize, path: &Path) -> Result<()> 
 /// samples, plane by plane or class by class. Pixels that were made of saturated samples, or are marked otherwise, are shown but
 /// not counted, as in [`measure`](crate::analysis::statistics::measure).
 ///
-/// A frame that makes no picture as it is shows its luminance, its lightness or its first plane in false color.
+/// A frame that makes no picture as it is shows its luminance, its lightness, the middle plane of its spectra or its first plane in false
+/// color; on a sheet one whose numbers are all the same, or that has none, a flat cell that says so.
 ///
 /// # Errors
 ///
@@ -120,8 +121,10 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
         settings.fit = settings.fit.or(Some(THUMBNAIL));
     }
     let is_map = settings.plane.is_none() && Choice::is_of_map(&frame);
-    let is_told = !is_map && (settings.plane.is_some() || settings.false_color || is_alone);
-    let choice = if is_told || !is_map && shade::is_picture(&frame, settings.range) {
+    // On a sheet each shows what it can.
+    let is_one = settings.false_color && (is_alone || frame.geometry.channels.len() == 1);
+    let is_told = !is_map && (settings.plane.is_some() || is_one || is_alone);
+    let choice = if is_told || !is_map && !settings.false_color && shade::is_picture(&frame, settings.range) {
         Choice::of(&frame, settings.plane.as_deref(), settings.false_color)?
     } else {
         settings.false_color = true;
@@ -132,9 +135,13 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
     let region = settings.region.unwrap_or(Region::whole(&frame));
     let mut tally = Tally::new(&frame, &source, region, &choice);
     let reduced = Reduced::read(&mut source, &reduction, &choice, Some(&mut tally))?;
-    let shown = Shown::paint(&frame, &settings, &choice, &reduced)?;
+    let shown = match Shown::paint(&frame, &settings, &choice, &reduced) {
+        Err(error) if !is_alone => Shown::flat(&settings, &reduced).ok_or(error)?,
+        painted => painted?,
+    };
     let scale = scale(&settings, reduction.in_words(choice.filter), &shown);
     if let Some(words) = settings.caption.filter(|words| !words.is_empty()) {
+        doubt_of_caption(&words);
         return Ok(shown.tile(String::new(), words.lines().map(str::to_owned).chain(scale).collect()));
     }
     let mut caption = vec![planes::stage(&frame, &choice, [region.width, region.height])];
@@ -150,6 +157,19 @@ pub fn thumbnail(source: &mut dyn RowSource, settings: &PictureSettings) -> Resu
     }
     caption.extend(scale);
     Ok(shown.tile(frame.name, caption))
+}
+
+/// Warns of a caption that is not written as it was given.
+fn doubt_of_caption(words: &str) {
+    let lacking = lacking(words);
+    if !lacking.is_empty() {
+        let shown: Vec<String> = lacking.iter().map(char::to_string).collect();
+        let problem = "the font of pictures lacks them, and a question mark stands there";
+        register::doubt(format!(
+            "the caption has characters such as {}: {problem}",
+            shown[..shown.len().min(8)].join(" ")
+        ));
+    }
 }
 
 /// What black, white and a pixel of the picture are.
@@ -215,7 +235,9 @@ impl Shown {
             let missing = reduced.samples.iter().any(|sample| !sample.is_finite());
             let missing = missing.then(|| (MISSING, "not finite".to_owned()));
             let scale = if is_temperature && low > 0.0 { Scale::Reciprocal } else { Scale::Linear };
-            let bar = ScaleBar { label: choice.label(frame), range: (low, high), scale, colors: ramp(), missing };
+            let only = shade::only_value(reduced).filter(|value| (low..=high).contains(value));
+            let only = only.map(|value| (value, planes::level(value)));
+            let bar = ScaleBar { label: choice.label(frame), range: (low, high), scale, colors: ramp(), missing, only };
             let bytes = zoomed(&reduced.in_false_color(&bar, MISSING), reduced.size, 3, zoom);
             let scale = shade::beyond(reduced, (low, high), range);
             let seen = [((low, high), reduced.quantiles(0, [0.0, 1.0]))];
@@ -232,6 +254,21 @@ impl Shown {
             bar: None,
             scale: shade.words(frame, choice),
         })
+    }
+
+    /// A flat cell for what no range is of: no finite numbers, or all of one value. None of others, and where the range is given in values.
+    fn flat(settings: &PictureSettings, reduced: &Reduced) -> Option<Self> {
+        /// Neither black nor white.
+        const GRAY: [u8; 3] = [0x80; 3];
+        let (rgb, words) = match shade::only_value(reduced) {
+            _ if matches!(settings.range, Some(Range::Values(..))) && reduced.has_numbers() => return None,
+            Some(value) => (GRAY, format!("all samples are {}", planes::level(value))),
+            None if reduced.has_numbers() => return None,
+            None => (MISSING, "no sample is finite".to_owned()),
+        };
+        let size = reduced.size.map(|side| side * settings.zoom.max(1));
+        let bytes = vec![rgb; size[0] * size[1]].into_flattened();
+        Some(Self { size, samples_per_pixel: 3, bytes, bar: None, scale: Some(words) })
     }
 
     fn tile(self, name: String, caption: Vec<String>) -> Tile {

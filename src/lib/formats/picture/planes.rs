@@ -63,11 +63,14 @@ impl Choice {
             .ok_or_else(|| Error::Usage(format!("{}: there is no plane `{name}`; it has {}", frame.name, known(frame))))
     }
 
-    /// The plane that says most of a frame, for one that is no picture as it is: its luminance or lightness, or the first.
+    /// The plane that says most of a frame, for one that is no picture as it is: its luminance or lightness, the middle one of spectra, or the
+    /// first.
     pub fn leading(frame: &FrameHeader) -> Self {
         let place = |name: &str| (0..frame.geometry.channels.len()).find(|place| frame.channel_name(*place) == name);
         let place = match frame.metadata.quantity {
             QuantityKind::Cct => place("CCT"),
+            // The first wavelengths are often those where little is seen.
+            QuantityKind::SpectralRadiance => frame.geometry.channels.len().checked_sub(1).map(|last| last / 2),
             _ => place("Y").or_else(|| place("L")),
         };
         Self { channels: vec![place.unwrap_or(0)], filter: None, called: None }

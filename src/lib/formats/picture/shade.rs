@@ -44,6 +44,22 @@ impl Shade {
     ///
     /// [`Error::Usage`] for a range that shows nothing; [`Error::Format`] for quantities that are no picture.
     pub fn new(frame: &FrameHeader, range: Range, choice: &Choice, reduced: &Reduced) -> Result<Self> {
+        let nobodys = match only_value(reduced) {
+            Some(value) => format!("all its samples are {}, which makes no range from black to white", level(value)),
+            None => "its levels make no range from black to white".to_owned(),
+        };
+        let is_given = matches!(range, Range::Values(..));
+        Self::of_range(frame, range, choice, reduced).map_err(|error| match error {
+            Error::Usage(_) if !is_given => {
+                let advice =
+                    "name one with --range LOW,HIGH, or show a plane in false color (--false-color), which needs none";
+                Error::Usage(format!("{}: {nobodys}; {advice}", frame.name))
+            }
+            other => other,
+        })
+    }
+
+    fn of_range(frame: &FrameHeader, range: Range, choice: &Choice, reduced: &Reduced) -> Result<Self> {
         let planes = 0..reduced.planes;
         let none = || nothing(frame);
         let is_xyz = frame.metadata.quantity == QuantityKind::Xyz && reduced.planes == 3;
@@ -248,6 +264,13 @@ fn about_inverse(reduced: &Reduced, plane: usize, count: f64) -> (f64, f64) {
     let (mean, spread) = (moments.mean[0], count * moments.std(0).unwrap_or(0.0));
     let high = if mean > spread { (mean - spread).recip() } else { reduced.moments(plane).max[0] };
     ((mean + spread).recip(), high)
+}
+
+/// The number that all finite samples are.
+pub(super) fn only_value(reduced: &Reduced) -> Option<f64> {
+    let mut finite = reduced.samples.iter().copied().filter(|sample| sample.is_finite());
+    let first = finite.next()?;
+    finite.all(|sample| sample == first).then(|| f64::from(first))
 }
 
 /// A complaint of a frame without numbers.

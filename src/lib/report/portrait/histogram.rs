@@ -42,7 +42,7 @@ pub(super) fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
         let name = with_means(bins.group, &scale.unit);
         panel.add(&name, bins.color, Marks::Line(bins.steps(window)));
         piles.extend(pile.map(|pile| pile.words(&bins.group.name)));
-        let foreseen = bins.group.predicted.as_ref().filter(|_| pile.is_none());
+        let foreseen = bins.group.predicted.as_ref().filter(|foreseen| pile.is_none() && !foreseen.is_clipped);
         is_far |= foreseen.is_some_and(|foreseen| foreseen.has_few_far);
         if let Some(foreseen) = foreseen.filter(|foreseen| !foreseen.has_few_far) {
             laws.push((words_of_law(foreseen, portrait.is_whole), bins.law(foreseen, portrait.is_whole)));
@@ -71,11 +71,18 @@ pub(super) fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
     panel.title = [words]
         .into_iter()
         .chain(piles)
-        .chain([no_law.to_owned()])
+        .chain([no_law.to_owned(), of_clipped(&groups)])
         .filter(|words| !words.is_empty())
         .collect::<Vec<_>>()
         .join("; ");
     panel
+}
+
+/// Over which groups no law is drawn as full well clips them; empty where over all.
+fn of_clipped(groups: &[Bins<'_>]) -> String {
+    let is_clipped = |bins: &&Bins| bins.group.predicted.as_ref().is_some_and(|foreseen| foreseen.is_clipped);
+    let names: Vec<&str> = groups.iter().filter(is_clipped).map(|bins| bins.group.name.as_str()).collect();
+    if names.is_empty() { String::new() } else { format!("no law drawn over {}: full well clips it", names.join(", ")) }
 }
 
 /// The histogram of a class or channel as a panel shows it: less a mean, in bins as wide as its own middle asks for.

@@ -138,15 +138,22 @@ impl Scene {
 
     /// What a user should know of a scene of a picture; `luminances` of its white are the one chosen and the one that its file tells.
     fn tell(&self, header: &FrameHeader, illuminant: &str, luminances: [Option<f64>; 2], found: &mut Found) {
+        /// More channels are not named one by one.
+        const MOST_NAMED: usize = 16;
         let [chosen, told] = luminances;
         let white_luminance = chosen.or(told).unwrap_or(WHITE_LUMINANCE);
         let name = &header.name;
         let others = &header.geometry.channels[3..];
         if !others.is_empty() {
-            found.notes.push(Note::Warning(format!(
-                "{name}: channels {} are left out; colors are taken as stored",
-                others.join(", ")
-            )));
+            let named = match others {
+                [first, second, third, .., last] if others.len() > MOST_NAMED => {
+                    format!("{first}, {second}, {third}, … {last}, {} in all,", others.len())
+                }
+                _ => others.join(", "),
+            };
+            found
+                .notes
+                .push(Note::Warning(format!("{name}: channels {named} are left out; colors are taken as stored")));
         }
         found.notes.push(Note::Remark(format!(
             "{name}: its spectra are made up by Jakob and Hanika (2019), metamers of its colors under d65; white has \

@@ -99,9 +99,14 @@ impl Scene {
                 let size = self.size.unwrap_or(whole);
                 if size[0] > whole[0] || size[1] > whole[1] {
                     let [columns, rows] = [size[0].div_ceil(*width), size[1].div_ceil(*height)];
+                    let all = [width * columns, height * rows];
+                    let all = match all == size {
+                        true => String::new(),
+                        false => format!(", without --size, in {}x{} photosites", all[0], all[1]),
+                    };
                     return Err(Error::Usage(format!(
                         "{source}: its {width}x{height} pixels in patches of {}x{} make {}x{} photosites, fewer than --size {}x{}; \
-                         give --patch {columns}x{rows} to show them all, or --sample N to show one everywhere",
+                         give --patch {columns}x{rows} to show them all{all}, or --sample N to show one everywhere",
                         patch[0], patch[1], whole[0], whole[1], size[0], size[1]
                     )));
                 }
