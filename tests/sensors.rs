@@ -134,11 +134,19 @@ fn a_flat_file_is_the_same_sensor() {
 #[test]
 fn curves_that_say_that_they_are_something_else_are_refused() {
     for (file, text, wanted) in [
-        ("qe.csv", "nm,R (A/W),G (A/W),B (A/W)\n360,0.1,0.2,0.3\n830,0.3,0.2,0.1\n", "its `R (A/W)` is a responsivity S"),
+        (
+            "qe.csv",
+            "nm,R (A/W),G (A/W),B (A/W)\n360,0.1,0.2,0.3\n830,0.3,0.2,0.1\n",
+            "its `R (A/W)` is a responsivity S",
+        ),
         ("qe.csv", "nm,R (%),G (%),B (%)\n360,0.1,0.2,0.3\n830,0.3,0.2,0.1\n", "its `R (%)` is in per cent"),
         ("qe.csv", "# Unit: %\nnm,R,G,B\n360,0.1,0.2,0.3\n830,0.3,0.2,0.1\n", "its `R` is in per cent"),
         ("glass.csv", "nm,T (%)\n360,0.1\n830,0.5\n", "its `T (%)` is in per cent"),
-        ("glass.csv", "# optical density\nnm,T\n360,0.1\n830,0.5\n", "its `T` is a logarithm; a transmittance is wanted"),
+        (
+            "glass.csv",
+            "# optical density\nnm,T\n360,0.1\n830,0.5\n",
+            "its `T` is a logarithm; a transmittance is wanted",
+        ),
         ("glass.csv", "nm,T\nnm,reflectance\n360,0.1\n830,0.5\n", "its `T` is another share of light"),
         ("qe.csv", "nm,R,G,B\n360,0.1,0.2,0.3\n830,0.3,0.2,1.3\n", "it must lie within 0 and 1"),
     ] {

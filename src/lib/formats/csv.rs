@@ -302,7 +302,8 @@ impl SpectralTable {
             let problem = format!("{like_uvspec}, or give --radiance-unit where they are radiances");
             return Err(Error::format(&self.name, problem));
         }
-        let of_uvspec = self.uvspec().map(|_| format!("{}: {like_uvspec}; it is `{}`", self.name, misread::UVSPEC[index]));
+        let of_uvspec =
+            self.uvspec().map(|_| format!("{}: {like_uvspec}; it is `{}`", self.name, misread::UVSPEC[index]));
         let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
         let (unit, assumed) = radiance_unit::settle(says, given)?;
         let samples = self.values.row(index).into_iter().zip(&self.wavelength_nm);
@@ -358,7 +359,8 @@ impl SpectralTable {
         let count = self.columns.len();
         if count > 1 {
             let names = self.columns.iter().take(8).map(String::as_str).collect::<Vec<_>>().join(", ");
-            let problem = format!("it holds {count} spectra, {names}, and a light is one; leave one, behind its wavelengths");
+            let problem =
+                format!("it holds {count} spectra, {names}, and a light is one; leave one, behind its wavelengths");
             return Err(Error::format(&self.name, problem));
         }
         match self.stated(0).and_then(|stated| quantities::of_light(&self.columns[0], stated)) {

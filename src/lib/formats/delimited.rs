@@ -61,7 +61,9 @@ impl Separator {
         let filled = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
         // `380;1 234,5` are no two cells between blanks, nor `380,<tab>1` between tabs.
         let is_parted = |cell: &&str| cell.ends_with([',', ';']) && self.is_number(cell.trim_end_matches([',', ';']));
-        if self == Self::Blanks && cells[0].contains([';', '\t']) || self == Self::Byte(b'\t') && cells.iter().any(is_parted) {
+        if self == Self::Blanks && cells[0].contains([';', '\t'])
+            || self == Self::Byte(b'\t') && cells.iter().any(is_parted)
+        {
             return false;
         }
         let is_of_decimals = || {

@@ -155,9 +155,9 @@ pub(super) fn holds_direct_light(values: &Array2<f64>) -> bool {
     let (edir, uavgdir) = (values.row(0), values.row(3));
     let mut ratios = edir.iter().zip(uavgdir).filter(|(a, b)| **a != 0.0 || **b != 0.0).map(|(a, b)| a / b);
     let most = 4.0 * std::f64::consts::PI * (1.0 + ROUNDING);
-    ratios.next().is_none_or(|first| {
-        (0.0..=most).contains(&first) && ratios.all(|ratio| (ratio / first - 1.0).abs() < ROUNDING)
-    })
+    ratios
+        .next()
+        .is_none_or(|first| (0.0..=most).contains(&first) && ratios.all(|ratio| (ratio / first - 1.0).abs() < ROUNDING))
 }
 
 /// What a text is that was read as no table, where that can be told.

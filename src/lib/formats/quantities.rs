@@ -42,7 +42,9 @@ pub(super) fn of_light(column: &str, stated: &Stated) -> Option<String> {
         OtherUnit::PerIrradiance | OtherUnit::Temperature | OtherUnit::Emissivity | OtherUnit::Ratio => {
             "not the power of a light"
         }
-        OtherUnit::Magnitude | OtherUnit::Depth | OtherUnit::Function => "a logarithm or a root, not the power of a light",
+        OtherUnit::Magnitude | OtherUnit::Depth | OtherUnit::Function => {
+            "a logarithm or a root, not the power of a light"
+        }
         kind => kind.in_words(),
     };
     let conversion = match kind {
@@ -124,7 +126,8 @@ mod tests {
             ("sky (counts)", "what an instrument reads"),
         ] {
             let found = light(&format!("nm,{heading}\n400,1\n500,2\n"));
-            let is_told = found.contains(wanted) && found.contains("of a light its power per nm is wanted, on any scale");
+            let is_told =
+                found.contains(wanted) && found.contains("of a light its power per nm is wanted, on any scale");
             assert!(is_told, "{heading}: {found}");
         }
         assert!(light("# photon flux\nnm,x\n400,1\n500,2\n").contains("a unit of photons"));

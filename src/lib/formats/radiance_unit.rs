@@ -135,11 +135,7 @@ fn agreed(name: &str, stated: RadianceUnit, given: Option<RadianceUnit>) -> Resu
 }
 
 /// The unit where comments alone may tell it, with a warning where they speak of another quantity.
-fn of_remarks(
-    name: &str,
-    remarks: &[Stated],
-    given: Option<RadianceUnit>,
-) -> Result<(RadianceUnit, Option<String>)> {
+fn of_remarks(name: &str, remarks: &[Stated], given: Option<RadianceUnit>) -> Result<(RadianceUnit, Option<String>)> {
     let mut units: Vec<RadianceUnit> = Vec::new();
     for remark in remarks {
         if let Stated::Radiance(unit) = remark
@@ -148,10 +144,12 @@ fn of_remarks(
             units.push(*unit);
         }
     }
-    let others = || remarks.iter().filter_map(|remark| match remark {
-        Stated::Radiance(_) => None,
-        Stated::Other { text, kind } => Some((text, kind)),
-    });
+    let others = || {
+        remarks.iter().filter_map(|remark| match remark {
+            Stated::Radiance(_) => None,
+            Stated::Other { text, kind } => Some((text, kind)),
+        })
+    };
     match (units.as_slice(), given) {
         ([unit], given) => agreed(name, *unit, given).map(|unit| (unit, None)),
         // Another unit in a comment may be that of something else.

@@ -47,8 +47,7 @@ fn other_quantity(comment: &str) -> Option<Stated> {
     let mut words = before.split(|c: char| !c.is_alphanumeric());
     let states = words.any(|word| ["unit", "units"].contains(&word.to_lowercase().as_str()));
     let is_no_radiance = |stated: &Stated| {
-        is_other(stated)
-            || matches!(stated, Stated::Other { kind: OtherUnit::Relative | OtherUnit::BesideFactor, .. })
+        is_other(stated) || matches!(stated, Stated::Other { kind: OtherUnit::Relative | OtherUnit::BesideFactor, .. })
     };
     states
         .then(|| unit_of_heading(stated).or_else(|| unit_of_heading(&format!("({})", stated.trim()))))?

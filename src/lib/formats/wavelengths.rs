@@ -157,4 +157,3 @@ fn sorted(wavelength_nm: Vec<f64>, values: Array2<f64>) -> (Vec<f64>, Array2<f64
     order.sort_by(|a, b| wavelength_nm[*a].total_cmp(&wavelength_nm[*b]));
     (order.iter().map(|place| wavelength_nm[*place]).collect(), values.select(Axis(1), &order))
 }
-

@@ -114,7 +114,9 @@ impl OtherUnit {
             Self::OtherAngle => "of a radiance per arcsec2 multiply each value by 4.254517e10, per deg2 by 3282.806",
             Self::PerIrradiance => "multiply each value by the irradiance that it is of",
             Self::Temperature => "take the radiance of a black body of that temperature, by Planck's law",
-            Self::Emissivity => "multiply each value by the radiance of a black body of its temperature, by Planck's law",
+            Self::Emissivity => {
+                "multiply each value by the radiance of a black body of its temperature, by Planck's law"
+            }
             Self::Magnitude => "multiply 10^(-0.4 value) by the radiance of 0 mag/arcsec2",
             Self::Depth => {
                 "multiply the radiance of the same light without the layer by the transmittance: e^-value of a depth, 10^-value of a density"

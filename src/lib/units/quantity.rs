@@ -105,8 +105,8 @@ mod tests {
     #[test]
     fn quantities_that_are_no_radiance_are_told() {
         use OtherUnit::{
-            AllWavelengths, Depth, Emissivity, Intensity, Irradiance, Magnitude, Mean, OtherAngle, PerFrequency, PerIrradiance,
-            Photons, Power, Ratio, Responsivity, Temperature,
+            AllWavelengths, Depth, Emissivity, Intensity, Irradiance, Magnitude, Mean, OtherAngle, PerFrequency,
+            PerIrradiance, Photons, Power, Ratio, Responsivity, Temperature,
         };
         for (text, kind) in [
             ("Rrs (sr-1)", PerIrradiance),
@@ -142,7 +142,9 @@ mod tests {
             let found = unit_of_heading(text);
             assert!(matches!(&found, Some(Stated::Other { kind: found, .. }) if *found == kind), "{text}: {found:?}");
         }
-        for text in ["optical depth 0.3", "emissivity 0.98", "temperature 5000", "K", "OD", "A", "deg 45", "no absorption"] {
+        for text in
+            ["optical depth 0.3", "emissivity 0.98", "temperature 5000", "K", "OD", "A", "deg 45", "no absorption"]
+        {
             assert_eq!(unit_of_heading(text), None, "{text}");
         }
     }

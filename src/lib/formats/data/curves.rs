@@ -131,7 +131,11 @@ fn within_unit(sensor: &str, key: &str, curve: Curve) -> Result<Curve> {
     if low < 0.0 || high > 1.0 {
         /// From here on it is no fraction that is a little too large.
         const PER_CENT: f64 = 2.0;
-        let per_cent = if low >= 0.0 && (PER_CENT..=100.0).contains(&high) { ", and looks like per cent: divide it by 100" } else { "" };
+        let per_cent = if low >= 0.0 && (PER_CENT..=100.0).contains(&high) {
+            ", and looks like per cent: divide it by 100"
+        } else {
+            ""
+        };
         let problem = format!("`{key}` runs from {low} to {high}; it must lie within 0 and 1{per_cent}");
         return Err(Error::format(sensor, problem));
     }

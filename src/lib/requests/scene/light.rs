@@ -213,10 +213,19 @@ impl Named {
     }
 
     /// Where something is wrong: a pixel, from 0, and the first of its planes whose sample is no finite number.
-    fn pixel(&self, [x, y]: [usize; 2], planes: impl IntoIterator<Item = usize>, sample: impl Fn(usize) -> f32) -> String {
+    fn pixel(
+        &self,
+        [x, y]: [usize; 2],
+        planes: impl IntoIterator<Item = usize>,
+        sample: impl Fn(usize) -> f32,
+    ) -> String {
         let wrong = planes.into_iter().find(|plane| !sample(*plane).is_finite());
         let channel = wrong.and_then(|plane| {
-            Some(format!(", where its channel {} is {}; write a radiance there", self.channels.get(plane)?, sample(plane)))
+            Some(format!(
+                ", where its channel {} is {}; write a radiance there",
+                self.channels.get(plane)?,
+                sample(plane)
+            ))
         });
         format!(" at pixel {x},{y}{}", channel.unwrap_or_default())
     }
