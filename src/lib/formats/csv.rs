@@ -845,6 +845,19 @@ mod tests {
                 ("# Unit: W m-2 sr-1\nnm,L\n400,1\n", "`W m-2 sr-1`, a radiance over all", "the width of the band"),
                 ("# units of values = reflectance\nnm,L\n400,1\n", "a ratio", "as a fraction of 1, by the radiance"),
                 ("# Unit: %\nnm,L\n400,1\n", "`%`, a ratio", "as a fraction of 1, by the radiance"),
+                (
+                    "# irradiance in mW/(m2 nm)\nnm;value\n400;1\n",
+                    "`mW/(m2 nm)`, an irradiance",
+                    "those of one direction",
+                ),
+                ("# photon radiance\nnm,L\n400,1\n", "a unit of photons", "by the energy of its photons"),
+                (
+                    "nm,Rrs (sr-1)\n400,1\n",
+                    "`Rrs (sr-1)`, a radiance over an irradiance",
+                    "by the irradiance that it is of",
+                ),
+                ("nm,brightness temperature (K)\n400,1\n", "a temperature, not the radiance", "Planck's law"),
+                ("# lambda uu [K]\n400 280\n", "a temperature, not the radiance", "Planck's law"),
             ] {
                 let refused = unit(text, given).unwrap_err().to_string();
                 assert!(refused.contains(quantity) && refused.contains(conversion), "{text}: {refused}");
@@ -859,6 +872,10 @@ mod tests {
         ] {
             assert_eq!(unit(text, given).unwrap().0, watts, "{text}");
         }
+        let (_, warned) = unit("# from W m-2 nm-1 of the sun\nnm,L\n400,1\n", given).unwrap();
+        let wanted = "a: a comment speaks of `W m-2 nm-1`, an irradiance, which has no sr-1; its values count as W m-2 sr-1 nm-1";
+        assert!(warned.as_ref().is_some_and(|warned| warned.starts_with(wanted)), "{warned:?}");
+        assert_eq!(unit("# of an irradiance of 3 W m-2\nnm,L\n400,1\n", given).unwrap().1, None);
         // 1 erg is 10⁻⁷ J.
         for text in [
             "nm,L (erg s-1 cm-2 sr-1 nm-1)\n400,1\n",

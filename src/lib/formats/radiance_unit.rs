@@ -150,11 +150,15 @@ fn of_remarks(name: &str, remarks: &[Stated], given: Option<RadianceUnit>) -> Re
             Stated::Other { text, kind } => Some((text, kind)),
         })
     };
+    // `1361 W m-2` is a value of its own.
+    let is_of_values = |(text, kind): &(&String, &OtherUnit)| {
+        kind.conversion().is_some() && !text.starts_with(|c: char| c.is_ascii_digit())
+    };
     match (units.as_slice(), given) {
         ([unit], given) => agreed(name, *unit, given).map(|unit| (unit, None)),
         // Another unit in a comment may be that of something else.
         ([], Some(given)) => {
-            let warned = others().find(|(_, kind)| kind.conversion().is_some()).map(|(text, kind)| {
+            let warned = others().find(is_of_values).map(|(text, kind)| {
                 format!(
                     "{name}: a comment speaks of `{text}`, {}; its values count as {given}, as --radiance-unit says: are they?",
                     kind.in_words()
