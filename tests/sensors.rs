@@ -131,6 +131,32 @@ fn a_flat_file_is_the_same_sensor() {
     assert!(parse_sensor("s", format!("{HEAD}{MATRIX}").as_bytes()).unwrap().check().is_ok());
 }
 
+#[test]
+fn curves_that_say_that_they_are_something_else_are_refused() {
+    for (file, text, wanted) in [
+        (
+            "qe.csv",
+            "nm,R (A/W),G (A/W),B (A/W)\n360,0.1,0.2,0.3\n830,0.3,0.2,0.1\n",
+            "its `R (A/W)` is a responsivity S",
+        ),
+        ("qe.csv", "nm,R (%),G (%),B (%)\n360,0.1,0.2,0.3\n830,0.3,0.2,0.1\n", "its `R (%)` is in per cent"),
+        ("qe.csv", "# Unit: %\nnm,R,G,B\n360,0.1,0.2,0.3\n830,0.3,0.2,0.1\n", "its `R` is in per cent"),
+        ("glass.csv", "nm,T (%)\n360,0.1\n830,0.5\n", "its `T (%)` is in per cent"),
+        (
+            "glass.csv",
+            "# optical density\nnm,T\n360,0.1\n830,0.5\n",
+            "its `T` is a logarithm; a transmittance is wanted",
+        ),
+        ("glass.csv", "nm,T\nnm,reflectance\n360,0.1\n830,0.5\n", "its `T` is another share of light"),
+        ("qe.csv", "nm,R,G,B\n360,0.1,0.2,0.3\n830,0.3,0.2,1.3\n", "it must lie within 0 and 1"),
+    ] {
+        let bench = Bench::new();
+        bench.write(file, text);
+        let refused = load_sensor(&bench.path("parts.yaml").display().to_string()).unwrap_err().to_string();
+        assert!(refused.contains(wanted), "{refused}");
+    }
+}
+
 /// Keys of what is left out at 0 may be written out.
 #[test]
 fn what_is_nothing_may_be_said() {

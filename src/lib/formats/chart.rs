@@ -175,7 +175,7 @@ fn three_columns(name: &str, bytes: &[u8], wanted: [&str; 3]) -> Result<Vec<[f64
 pub enum Light {
     /// An illuminant.
     Illuminant(Illuminant),
-    /// The first curve of a file.
+    /// The curve of a file.
     Measured(String, Curve),
 }
 

@@ -9,13 +9,14 @@ use super::delimited;
 use super::factors::doubt_of_factor;
 use super::foreign::{csv_complaint, line_of};
 use super::misread::{self, is_units};
+use super::quantities;
 use super::radiance_unit::{self, Brightness, FileSays, times_white};
 use super::register;
 use super::remarks::{Comments, MAX_COMMENTS};
 use super::spectral_heading::{self, Wavelengths, check_first_column, is_behind_index, refuse_index, without_first};
 use super::thousands::Points;
 use super::uncertainties;
-use super::wavelengths::{check_nm, check_order, check_stated};
+use super::wavelengths::in_nm;
 use crate::error::{Error, Result};
 use crate::names::place_of;
 use crate::spectrum::{Along, Between, Curve};
@@ -288,9 +289,7 @@ impl SpectralTable {
     /// Those of [`Self::check`] and [`radiance_unit::settle`].
     pub fn radiance_unit(&self, index: usize, given: Option<RadianceUnit>) -> Result<(RadianceUnit, Option<String>)> {
         self.check(index)?;
-        let names_radiance = self.remarks.iter().any(|remark| matches!(remark, Stated::Radiance(_)));
-        let other = self.other_quantity.as_ref().filter(|_| !names_radiance);
-        let heading = self.headings.get(index).and_then(Option::as_ref).or(other);
+        let heading = self.stated(index);
         let place = "in the heading, as in `radiance (W m-2 sr-1 nm-1)`";
         if self.counted_in.is_of_energy() && heading.is_none() && self.remarks.is_empty() && given.is_none() {
             let what = if self.counted_in == WavelengthUnit::ElectronVolt { "photon energy" } else { "wavenumber" };
@@ -298,21 +297,40 @@ impl SpectralTable {
                 format!("it is by {what} and does not say whether its radiance is per nm or per {}", self.counted_in);
             return Err(Error::format(&self.name, problem).give(&["radiance_unit"]));
         }
-        if self.is_bare && self.columns.len() + 1 == misread::UVSPEC && self.remarks.is_empty() && given.is_none() {
-            let problem = "its seven columns without a heading look like what libRadtran's uvspec writes by default, irradiances and \
-                           mean intensities; have it write radiances, by `output_user lambda uu`, or give --radiance-unit where \
-                           they are";
+        let like_uvspec = misread::LIKE_UVSPEC;
+        if self.is_like_uvspec() && given.is_none() {
+            let problem = format!("{like_uvspec}, or give --radiance-unit where they are radiances");
             return Err(Error::format(&self.name, problem));
         }
+        let of_uvspec =
+            self.uvspec().map(|_| format!("{}: {like_uvspec}; it is `{}`", self.name, misread::UVSPEC[index]));
         let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
         let (unit, assumed) = radiance_unit::settle(says, given)?;
         let samples = self.values.row(index).into_iter().zip(&self.wavelength_nm);
         let brightest = samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).fold(0.0, f64::max);
         let times = times_white(brightest);
-        self.points.check(&self.name, index, times)?;
+        let doubt = self.points.check(&self.name, index, times)?;
         let is_assumed = heading.is_none() && self.remarks.is_empty() && given.is_none();
         let bright = Brightness::of([times]).judge(&self.name, unit, is_assumed)?;
-        Ok((unit, assumed.or(bright)))
+        Ok((unit, of_uvspec.or(assumed).or(doubt).or(bright)))
+    }
+
+    /// What a heading, or a comment about all columns, says that a curve is.
+    pub(super) fn stated(&self, index: usize) -> Option<&Stated> {
+        let names_radiance = self.remarks.iter().any(|remark| matches!(remark, Stated::Radiance(_)));
+        let other = self.other_quantity.as_ref().filter(|_| !names_radiance);
+        self.headings.get(index).and_then(Option::as_ref).or(other)
+    }
+
+    /// Whether it has as many columns as what uvspec writes by default, and says nothing of them.
+    fn is_like_uvspec(&self) -> bool {
+        self.is_bare && self.columns.len() == misread::UVSPEC.len() && self.remarks.is_empty()
+    }
+
+    /// What its columns are where they go with each other as those do that libRadtran's uvspec writes by default, none of which is a
+    /// radiance.
+    pub fn uvspec(&self) -> Option<&'static str> {
+        (self.is_like_uvspec() && misread::holds_direct_light(&self.values)).then_some(misread::LIKE_UVSPEC)
     }
 
     /// The columns of which nothing says that they hold anything but radiances.
@@ -324,11 +342,12 @@ impl SpectralTable {
         likely.map(|(_, (column, _))| column.as_str()).collect()
     }
 
-    /// The first column as the relative power of a light, per interval of wavelength.
+    /// Its one column as the relative power of a light, per interval of wavelength.
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] where it is by wavenumber, or for values that make no curve.
+    /// [`Error::Format`] where it is by wavenumber, or says that it is another quantity; for several columns, and for values that make no
+    /// curve.
     pub fn light(&self) -> Result<Curve> {
         let is_per_wavenumber =
             matches!(self.headings.first(), Some(Some(Stated::Radiance(unit))) if unit.is_per_wavenumber());
@@ -337,7 +356,17 @@ impl SpectralTable {
             let problem = format!("a light by {what} is not read; give its power per nm by wavelength");
             return Err(Error::format(&self.name, problem));
         }
-        self.curve(None)
+        let count = self.columns.len();
+        if count > 1 {
+            let names = self.columns.iter().take(8).map(String::as_str).collect::<Vec<_>>().join(", ");
+            let problem =
+                format!("it holds {count} spectra, {names}, and a light is one; leave one, behind its wavelengths");
+            return Err(Error::format(&self.name, problem));
+        }
+        match self.stated(0).and_then(|stated| quantities::of_light(&self.columns[0], stated)) {
+            Some(problem) => Err(Error::format(&self.name, problem)),
+            None => self.curve(None),
+        }
     }
 
     /// A warning of values below zero in a curve of radiances, if there are any, or of nothing but zeros.
@@ -436,40 +465,11 @@ fn is_of_radiance(heading: &str) -> bool {
     unit_of_heading(heading).is_some_and(|stated| !is_other(&stated))
 }
 
-/// Wavelengths of a unit, of nm where none is said, in nm and ascending, and the curves over them.
-///
-/// # Errors
-///
-/// What is wrong with them, in words.
-fn in_nm(
-    mut wavelengths: Vec<f64>,
-    values: Array2<f64>,
-    unit: Option<WavelengthUnit>,
-) -> std::result::Result<(Vec<f64>, Array2<f64>), String> {
-    unit.map_or(Ok(()), |unit| check_stated(&wavelengths, unit))?;
-    let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
-    wavelengths.iter_mut().for_each(|wavelength| *wavelength = unit.nm(*wavelength));
-    check_order(&wavelengths)?;
-    let (wavelength_nm, values) = sorted(wavelengths, values);
-    check_nm(&wavelength_nm)?;
-    Ok((wavelength_nm, values))
-}
-
 /// The unit of wavelengths that their heading names.
 fn wavelength_unit(heading: Option<&str>) -> std::result::Result<Option<WavelengthUnit>, String> {
     WavelengthUnit::of_heading(heading.unwrap_or_default()).map_err(|counted| {
         format!("its first column holds {counted}; wavelengths are wanted, under a heading such as `wavelength_nm`")
     })
-}
-
-/// Wavelengths in ascending order, and the curves over them.
-fn sorted(wavelength_nm: Vec<f64>, values: Array2<f64>) -> (Vec<f64>, Array2<f64>) {
-    if wavelength_nm.is_sorted() {
-        return (wavelength_nm, values);
-    }
-    let mut order: Vec<usize> = (0..wavelength_nm.len()).collect();
-    order.sort_by(|a, b| wavelength_nm[*a].total_cmp(&wavelength_nm[*b]));
-    (order.iter().map(|place| wavelength_nm[*place]).collect(), values.select(Axis(1), &order))
 }
 
 /// A heading without the unit in brackets behind it.
@@ -781,7 +781,12 @@ mod tests {
         let unit = |text: &str, given| SpectralTable::parse("t", text.as_bytes()).unwrap().radiance_unit(0, given);
         let refused = unit(&uvspec(6), None).unwrap_err().to_string();
         assert!(refused.contains("what libRadtran's uvspec writes by default"), "{refused}");
-        assert!(unit(&uvspec(6), Some(RadianceUnit::USUAL[2])).is_ok() && unit(&uvspec(5), None).is_ok());
+        assert!(unit(&uvspec(5), None).is_ok());
+        let (_, warned) = unit(&uvspec(6), Some(RadianceUnit::USUAL[2])).unwrap();
+        assert!(warned.is_some_and(|warned| warned.ends_with("by `output_user lambda uu`; it is `edir`")));
+        // Of `output_user lambda uu` no column is a share of another at all wavelengths.
+        let radiances = "400.0 1 2 3 4 5 6\n410.0 1 2 3 4.1 5 6\n420.0 1 2 3 4.2 5 6\n";
+        assert_eq!(unit(radiances, Some(RadianceUnit::USUAL[2])).unwrap().1, None);
     }
 
     #[test]
@@ -840,6 +845,19 @@ mod tests {
                 ("# Unit: W m-2 sr-1\nnm,L\n400,1\n", "`W m-2 sr-1`, a radiance over all", "the width of the band"),
                 ("# units of values = reflectance\nnm,L\n400,1\n", "a ratio", "as a fraction of 1, by the radiance"),
                 ("# Unit: %\nnm,L\n400,1\n", "`%`, a ratio", "as a fraction of 1, by the radiance"),
+                (
+                    "# irradiance in mW/(m2 nm)\nnm;value\n400;1\n",
+                    "`mW/(m2 nm)`, an irradiance",
+                    "those of one direction",
+                ),
+                ("# photon radiance\nnm,L\n400,1\n", "a unit of photons", "by the energy of its photons"),
+                (
+                    "nm,Rrs (sr-1)\n400,1\n",
+                    "`Rrs (sr-1)`, a radiance over an irradiance",
+                    "by the irradiance that it is of",
+                ),
+                ("nm,brightness temperature (K)\n400,1\n", "a temperature, not the radiance", "Planck's law"),
+                ("# lambda uu [K]\n400 280\n", "a temperature, not the radiance", "Planck's law"),
             ] {
                 let refused = unit(text, given).unwrap_err().to_string();
                 assert!(refused.contains(quantity) && refused.contains(conversion), "{text}: {refused}");
@@ -854,6 +872,10 @@ mod tests {
         ] {
             assert_eq!(unit(text, given).unwrap().0, watts, "{text}");
         }
+        let (_, warned) = unit("# from W m-2 nm-1 of the sun\nnm,L\n400,1\n", given).unwrap();
+        let wanted = "a: a comment speaks of `W m-2 nm-1`, an irradiance, which has no sr-1; its values count as W m-2 sr-1 nm-1";
+        assert!(warned.as_ref().is_some_and(|warned| warned.starts_with(wanted)), "{warned:?}");
+        assert_eq!(unit("# of an irradiance of 3 W m-2\nnm,L\n400,1\n", given).unwrap().1, None);
         // 1 erg is 10⁻⁷ J.
         for text in [
             "nm,L (erg s-1 cm-2 sr-1 nm-1)\n400,1\n",

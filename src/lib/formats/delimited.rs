@@ -59,8 +59,11 @@ impl Separator {
     fn makes_numbers(self, row: &str) -> bool {
         let cells: Vec<&str> = self.cells(row);
         let filled = cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
-        // `380;1 234,5` are no two cells between blanks.
-        if self == Self::Blanks && cells[0].contains([';', '\t']) {
+        // `380;1 234,5` are no two cells between blanks, nor `380,<tab>1` between tabs.
+        let is_parted = |cell: &&str| cell.ends_with([',', ';']) && self.is_number(cell.trim_end_matches([',', ';']));
+        if self == Self::Blanks && cells[0].contains([';', '\t'])
+            || self == Self::Byte(b'\t') && cells.iter().any(is_parted)
+        {
             return false;
         }
         let is_of_decimals = || {

@@ -12,8 +12,12 @@ use crate::units::{WavelengthUnit, unit_of_heading};
 use csv::StringRecord;
 use ndarray::Array2;
 
-/// Columns that uvspec writes by default: the wavelength, edir, edn, eup, uavgdir, uavgdn, uavgup.
-pub(super) const UVSPEC: usize = 7;
+/// Columns that uvspec writes by default behind that of wavelengths: irradiances and mean intensities, direct, down and up.
+pub(super) const UVSPEC: [&str; 6] = ["edir", "edn", "eup", "uavgdir", "uavgdn", "uavgup"];
+/// What is said of a table that has as many.
+pub(super) const LIKE_UVSPEC: &str = "its seven columns without a heading look like what libRadtran's uvspec writes by default, \
+                                      irradiances and mean intensities (edir, edn, eup, uavgdir, uavgdn, uavgup); have it write radiances, by \
+                                      `output_user lambda uu`";
 
 /// Above this all wavelengths look like angstroms or wavenumbers, in nm: no silicon responds.
 pub(super) const LONGEST_NM: f64 = 2000.0;
@@ -88,7 +92,10 @@ pub(super) fn is_units(header: &StringRecord, record: &StringRecord) -> bool {
     // Behind a column that counts rows.
     let is_second = header.len() > 2 && !names_wavelengths(&header[0]) && header.get(1).is_some_and(is_of_wavelengths);
     let place = usize::from(is_second);
+    // `340 nm` is a wavelength.
+    let is_value = |cell: &str| cell.starts_with(|c: char| c.is_ascii_digit());
     record.iter().all(|cell| numeric(cell).is_none())
+        && !record.get(place).is_some_and(is_value)
         && !matches!(WavelengthUnit::of_heading(record.get(place).unwrap_or_default()), Ok(None))
         && (header.get(place).is_some_and(names_wavelengths) || record.iter().skip(1).all(is_unit))
 }
@@ -115,13 +122,42 @@ pub(super) fn check_shape(name: &str, numbers: &Array2<f64>, has_header: bool) -
 /// Whether numbers without a heading are a row of wavelengths above spectra: the first goes one way and is that of wavelengths, the
 /// first of all others are not.
 fn holds_rows_without_names(numbers: &Array2<f64>) -> bool {
+    /// So many values of a wavelength are no wavelengths themselves that go evenly, or are those of two wavelengths alone.
+    const MANY: usize = 8;
+    /// Of a step, what whole nanometers, or tenths, are rounded by.
+    const ROUNDING: f64 = 1e-6;
     let (first, below) = (numbers.row(0), numbers.slice(ndarray::s![1.., 0]));
     let ordered = |is_so: fn(&f64, &f64) -> bool| first.iter().zip(first.iter().skip(1)).all(|(a, b)| is_so(a, b));
+    let is_light = first.iter().all(|nm| (SHORTEST_NM..=MOST_NM).contains(nm));
+    let is_even = || {
+        let step = first[1] - first[0];
+        first.iter().zip(first.iter().skip(1)).all(|(a, b)| ((b - a) / step - 1.0).abs() < ROUNDING)
+    };
+    let are_unlike = || below.iter().all(|value| *value < SHORTEST_NM);
     first.len() > 2
         && !below.is_empty()
         && (ordered(|a, b| a < b) || ordered(|a, b| a > b))
         && first.iter().all(|nm| *nm >= SHORTEST_NM)
-        && below.iter().all(|value| *value < SHORTEST_NM)
+        && (are_unlike() || is_light && first.len() >= MANY && (is_even() || below.len() == 1))
+}
+
+/// What a camera sees ends far below.
+const MOST_NM: f64 = 5000.0;
+
+/// Whether curves go with each other as those of uvspec do: the direct irradiance is 4π times the cosine of the sun's angle times the direct
+/// mean intensity, the same at all wavelengths, or both are 0.
+pub(super) fn holds_direct_light(values: &Array2<f64>) -> bool {
+    /// uvspec prints seven digits.
+    const ROUNDING: f64 = 1e-4;
+    if values.nrows() != UVSPEC.len() || values.ncols() < 2 {
+        return false;
+    }
+    let (edir, uavgdir) = (values.row(0), values.row(3));
+    let mut ratios = edir.iter().zip(uavgdir).filter(|(a, b)| **a != 0.0 || **b != 0.0).map(|(a, b)| a / b);
+    let most = 4.0 * std::f64::consts::PI * (1.0 + ROUNDING);
+    ratios
+        .next()
+        .is_none_or(|first| (0.0..=most).contains(&first) && ratios.all(|ratio| (ratio / first - 1.0).abs() < ROUNDING))
 }
 
 /// What a text is that was read as no table, where that can be told.
@@ -163,9 +199,10 @@ fn uvspec(name: &str, text: &str) -> Option<Error> {
         .map(|line| line.split_whitespace().map(|cell| number(cell).map(drop)).collect::<Option<Vec<()>>>())
         .map(|cells| cells.map(|cells| cells.len()))
         .collect();
-    let is_so = widths.first() == Some(&Some(UVSPEC))
+    let usual = Some(UVSPEC.len() + 1);
+    let is_so = widths.first() == Some(&usual)
         && widths.iter().all(Option::is_some)
-        && widths.iter().any(|width| *width != Some(UVSPEC));
+        && widths.iter().any(|width| *width != usual);
     let problem = "it looks like what libRadtran's uvspec writes by default, with lines of directions below each wavelength; have it \
                    write a table of radiances, by `output_user lambda uu` in its input file";
     is_so.then(|| Error::format(name, problem))
@@ -253,8 +290,13 @@ fn preamble(name: &str, text: &str) -> Option<Error> {
         };
         let line = text.lines().nth(line - 1).unwrap_or_default();
         let parts = || line.split([',', ';', '\t']);
+        // Values may be taken for wavelengths, but for their order.
+        let goes_one_way = || {
+            let numbers: Vec<f64> = parts().filter_map(|cell| numeric(cell.trim())).collect();
+            numbers.is_sorted() || numbers.iter().rev().is_sorted()
+        };
         first(line).is_some_and(|cell| names_wavelengths(&cell))
-            || holds_wavelengths(parts())
+            || holds_wavelengths(parts()) && goes_one_way()
             || parts().count() > 1 && parts().any(|cell| is_of_wavelengths(cell.trim_matches(['"', ' '])))
     };
     if (first..=last).any(is_heading) && !is_heading(heading) {
@@ -422,5 +464,37 @@ mod tests {
             let found = complaint(&text);
             assert!(found.contains("libRadtran's uvspec") && found.contains("`output_user lambda uu`"), "{found}");
         }
+    }
+
+    #[test]
+    fn rows_of_wavelengths_without_names_are_told() {
+        let nameless = "its first row holds wavelengths, and its rows are spectra without names";
+        let wavelengths: String = (0..20).map(|place| format!("{},", 340 + place)).collect();
+        let spectrum: String = (0..20).map(|place| format!("{}.5,", 237 - 3 * place)).collect();
+        let [wavelengths, spectrum] = [&wavelengths, &spectrum].map(|row| row.trim_end_matches(',').to_owned());
+        for text in [format!("{wavelengths}\n{spectrum}\n"), format!("{wavelengths}\n{spectrum}\n{spectrum}\n")] {
+            assert!(complaint(&text).contains(nameless), "{text}: {}", complaint(&text));
+        }
+        let uneven = "400,401,403,410,420,435,470,500,560\n237.5,234,231,228,225,222,219,216,213\n";
+        assert!(complaint(uneven).contains(nameless), "{}", complaint(uneven));
+        let down = "400 101 102 103 104 105 106 108 109\n410 103 104 105 106 107 108 109 110\n420 1 1 1 1 1 1 1 1\n";
+        assert_eq!(complaint(down), "read");
+        // Dates, and values that may be taken for wavelengths, below a heading of these.
+        let dated = format!("date,lat,lon,{wavelengths}\n2024-05-01,45.1,7.2,{spectrum}\n");
+        let wanted = "t: line 1, column 2: `lat` is no wavelength, as the others are; leave the column out";
+        assert!(complaint(&dated).starts_with(wanted), "{}", complaint(&dated));
+    }
+
+    #[test]
+    fn a_row_of_values_with_their_units_is_no_row_of_units() {
+        let wanted = "t: line 2, column 1: `340.0 nm` is no number; write 340.0, and the unit in the heading";
+        assert_eq!(complaint("wavelength,radiance\n340.0 nm,237.8 mW/m2/sr/nm\n341.0 nm,234.6 mW/m2/sr/nm\n"), wanted);
+    }
+
+    #[test]
+    fn commas_beside_tabs_part_cells() {
+        let text = "wavelength (nm), radiance (mW/m2/sr/nm)\n340.0,\t2.3e2\n341.0,\t2.4e2\n";
+        let table = SpectralTable::parse("t", text.as_bytes()).unwrap();
+        assert_eq!((table.columns.len(), table.values[(0, 1)]), (1, 240.0));
     }
 }

@@ -39,6 +39,7 @@ pub mod places;
 pub mod plots;
 pub mod png;
 mod positioned;
+mod quantities;
 pub mod radiance_unit;
 pub mod read_ahead;
 pub mod register;

@@ -119,7 +119,7 @@ pub fn settle(says: FileSays<'_>, given: Option<RadianceUnit>) -> Result<(Radian
             let problem = format!("{name}: it does not say the unit of its radiance, which is taken as {unit}");
             Ok((unit, Some(format!("{problem}; name the unit {place}, or give --radiance-unit"))))
         }
-        None => of_remarks(name, remarks, given).map(|unit| (unit, None)),
+        None => of_remarks(name, remarks, given),
     }
 }
 
@@ -134,8 +134,8 @@ fn agreed(name: &str, stated: RadianceUnit, given: Option<RadianceUnit>) -> Resu
     }
 }
 
-/// The unit where comments alone may tell it.
-fn of_remarks(name: &str, remarks: &[Stated], given: Option<RadianceUnit>) -> Result<RadianceUnit> {
+/// The unit where comments alone may tell it, with a warning where they speak of another quantity.
+fn of_remarks(name: &str, remarks: &[Stated], given: Option<RadianceUnit>) -> Result<(RadianceUnit, Option<String>)> {
     let mut units: Vec<RadianceUnit> = Vec::new();
     for remark in remarks {
         if let Stated::Radiance(unit) = remark
@@ -144,20 +144,35 @@ fn of_remarks(name: &str, remarks: &[Stated], given: Option<RadianceUnit>) -> Re
             units.push(*unit);
         }
     }
+    let others = || {
+        remarks.iter().filter_map(|remark| match remark {
+            Stated::Radiance(_) => None,
+            Stated::Other { text, kind } => Some((text, kind)),
+        })
+    };
+    // `1361 W m-2` is a value of its own.
+    let is_of_values = |(text, kind): &(&String, &OtherUnit)| {
+        kind.conversion().is_some() && !text.starts_with(|c: char| c.is_ascii_digit())
+    };
     match (units.as_slice(), given) {
-        ([unit], given) => agreed(name, *unit, given),
+        ([unit], given) => agreed(name, *unit, given).map(|unit| (unit, None)),
         // Another unit in a comment may be that of something else.
-        ([], Some(given)) => Ok(given),
-        ([], None) => {
-            let other = remarks.iter().find_map(|remark| match remark {
-                Stated::Radiance(_) => None,
-                Stated::Other { text, kind } => Some(format!("`{text}`, {}", kind.in_words())),
+        ([], Some(given)) => {
+            let warned = others().find(is_of_values).map(|(text, kind)| {
+                format!(
+                    "{name}: a comment speaks of `{text}`, {}; its values count as {given}, as --radiance-unit says: are they?",
+                    kind.in_words()
+                )
             });
+            Ok((given, warned))
+        }
+        ([], None) => {
+            let other = others().next().map(|(text, kind)| format!("`{text}`, {}", kind.in_words()));
             let spoken_of = other.unwrap_or_default();
             let problem = format!("it does not say the unit of its values, and its comments speak of {spoken_of}");
             Err(Error::format(name, problem).give(&["radiance_unit"]))
         }
-        (several, Some(given)) if several.contains(&given) => Ok(given),
+        (several, Some(given)) if several.contains(&given) => Ok((given, None)),
         (several, given) => {
             let named: Vec<String> = several.iter().map(ToString::to_string).collect();
             let error = Error::format(name, format!("its comments name the units of radiance {}", named.join(" and ")));

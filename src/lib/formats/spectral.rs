@@ -213,7 +213,13 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
         }
     };
     match library.radiance.indexed_iter().find(|(_, value)| !value.is_finite()) {
-        Some(((sample, _), _)) => Err(Error::format(&name, format!("sample {sample} is not finite"))),
+        Some(((sample, place), value)) => {
+            let nm = library.wavelength_nm[place];
+            Err(Error::format(
+                &name,
+                format!("sample {sample} is not finite but {value} at {nm} nm; write a radiance there"),
+            ))
+        }
         None => {
             warnings.extend(negative(&name, &library.radiance));
             Ok((library, warnings))

@@ -25,7 +25,7 @@ pub(super) struct Thousands {
     has_decimal_points: bool,
 }
 
-/// Numbers whose points may be marks of thousands, one of each curve.
+/// Numbers whose points, or commas, may be marks of thousands, one of each curve.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) enum Points {
     /// None.
@@ -71,15 +71,23 @@ impl Points {
     }
 
     /// Refuses a curve of such numbers, `times_white` as bright as a white cloud in the sun at its brightest: a thousand times as bright
-    /// it may still be light of the sky.
+    /// it may still be light of the sky. Commas, which beside semicolons are those of decimals as a rule, are warned of.
     ///
     /// # Errors
     ///
     /// [`Error::Format`] naming a number.
-    pub(super) fn check(&self, name: &str, curve: usize, times_white: f64) -> Result<()> {
+    pub(super) fn check(&self, name: &str, curve: usize, times_white: f64) -> Result<Option<String>> {
         /// No sky is so many times as bright but near the sun.
         const MOST: f64 = 10.0;
-        let Some((cell, line)) = self.of(curve).filter(|_| 1000.0 * times_white <= MOST) else { return Ok(()) };
+        let Some((cell, line)) = self.of(curve).filter(|_| 1000.0 * times_white <= MOST) else { return Ok(None) };
+        if cell.contains(',') {
+            return Ok(Some(format!(
+                "{name}: line {line}: the comma of `{cell}` counts as that of decimals, {}; where it is that of thousands, write {}, and \
+                 so all numbers",
+                cell.replace(',', "."),
+                cell.replace(',', "")
+            )));
+        }
         let problem = format!(
             "line {line}: nobody can tell whether the point of `{cell}` is that of thousands or of decimals, beside semicolons and with \
              three digits behind every point; write {} or {cell}0, and so all numbers",
@@ -128,13 +136,18 @@ impl Thousands {
         }
     }
 
-    /// The curves of a table whose points may be marks of thousands: between semicolons, which people put where commas are those of
-    /// decimals and points those of thousands, where no number of the table has a point that can be that of decimals alone.
+    /// The curves of a table whose points, or commas, may be marks of thousands: between semicolons, which people put where commas are
+    /// those of decimals and points those of thousands, where no number of the table has a mark that can be that of decimals alone, as
+    /// that of a wavelength is.
     pub(super) fn points(self, separator: char, by_rows: bool) -> Points {
-        if separator != ';' || self.has_decimal_points {
+        let has_commas = |column: &Column| column.marked.as_ref().is_some_and(|(cell, _)| cell.contains(','));
+        let is_of_wavelengths = !by_rows && self.columns.first().is_some_and(has_commas);
+        let [points, commas] = [self.has_decimal_points, self.has_decimal_commas || is_of_wavelengths];
+        if separator != ';' || points && commas {
             return Points::Plain;
         }
-        let marked = |column: Column| column.marked.filter(|(cell, _)| cell.contains('.') && !column.has_other);
+        let may_be = |cell: &str| cell.contains('.') && !points || cell.contains(',') && !commas;
+        let marked = |column: Column| column.marked.filter(|(cell, _)| may_be(cell) && !column.has_other);
         let columns = self.columns.into_iter().enumerate().skip(1);
         let mut found = columns.filter_map(|(place, column)| Some((place - 1, marked(column)?)));
         match by_rows {
@@ -220,7 +233,7 @@ mod tests {
             let last = table.columns.len() - 1;
             table
                 .radiance_unit(last, crate::units::RadianceUnit::parse(unit))
-                .map(drop)
+                .map(|(_, warned)| warned.filter(|warned| warned.contains("the comma of")))
                 .map_err(|error| error.to_string())
         };
         let dim = "nW cm-2 sr-1 nm-1";
@@ -235,7 +248,7 @@ mod tests {
             let wanted = "nobody can tell whether the point of `51.309` is that of thousands or of decimals";
             assert!(refused.starts_with("t: line 2: ") && refused.contains(wanted), "{text}: {refused}");
             // 51 W m-2 sr-1 nm-1 are 760 times a white cloud.
-            assert_eq!(unit(text, "mW m-2 sr-1 nm-1"), Ok(()), "{text}");
+            assert_eq!(unit(text, "mW m-2 sr-1 nm-1"), Ok(None), "{text}");
         }
         for text in [
             "nm;L\n350;51.309\n600;0.345\n",
@@ -243,11 +256,21 @@ mod tests {
             "nm;L\n350.5;51.309\n600.5;12.345\n",
             "nm;L\n350.0;51.309\n600.0;12.345\n",
             "nm;L\n350;51.309\n600;1.2e1\n",
-            "nm;L\n350;51,309\n600;12,345\n",
+            "nm;L\n350;51,309\n600;0,345\n",
+            "nm;L\n350;51,309\n600;12,34\n",
+            "nm;L\n350,5;51,309\n600,5;12,345\n",
+            "nm;L\n350,000;51,309\n600,000;12,345\n",
             "nm,L\n350,51.309\n600,12.345\n",
             "nm L\n350 51.309\n600 12.345\n",
         ] {
-            assert_eq!(unit(text, dim), Ok(()), "{text}");
+            assert_eq!(unit(text, dim), Ok(None), "{text}");
+        }
+        // Commas of decimals are usual there.
+        for text in ["nm;L\n350;51,309\n600;12,345\n", "id;350;600\na;51,309;12,345\n"] {
+            let warned = unit(text, dim).unwrap_or_else(|error| panic!("{text}: {error}"));
+            let wanted = "t: line 2: the comma of `51,309` counts as that of decimals, 51.309; where it is that of thousands, write 51309";
+            assert!(warned.as_ref().is_some_and(|warned| warned.starts_with(wanted)), "{text}: {warned:?}");
+            assert_eq!(unit(text, "mW m-2 sr-1 nm-1"), Ok(None), "{text}");
         }
     }
 }

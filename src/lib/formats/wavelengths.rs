@@ -1,11 +1,12 @@
-//! Whether wavelengths are what they are said to be: in order, unlike, and those of light.
+//! Wavelengths in nm and in order, and whether they are what they are said to be: unlike, and those of light.
 
 use super::misread::LONGEST_NM;
 use crate::spectrum::{SHORTEST_NM, check_wavelengths};
 use crate::units::WavelengthUnit;
+use ndarray::{Array2, Axis};
 
 /// Refuses wavelengths of which all but one are in order, and no other could be the one: a slip that sorting would hide.
-pub(super) fn check_order(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
+fn check_order(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
     /// Of fewer nobody can tell the order.
     const LEAST: usize = 4;
     let breaks = |is_before: fn(&f64, &f64) -> bool| {
@@ -102,7 +103,7 @@ fn check_likely(wavelength_nm: &[f64]) -> std::result::Result<(), String> {
 }
 
 /// Refuses wavelengths that no light has in the unit that is said of them, where all are those of light in another.
-pub(super) fn check_stated(wavelengths: &[f64], stated: WavelengthUnit) -> std::result::Result<(), String> {
+fn check_stated(wavelengths: &[f64], stated: WavelengthUnit) -> std::result::Result<(), String> {
     const HEADINGS: [(WavelengthUnit, &str); 6] = [
         (WavelengthUnit::Nanometer, "wavelength_nm"),
         (WavelengthUnit::Micrometer, "wavelength_um"),
@@ -126,4 +127,33 @@ pub(super) fn check_stated(wavelengths: &[f64], stated: WavelengthUnit) -> std::
         }
         None => Ok(()),
     }
+}
+
+/// Wavelengths of a unit, of nm where none is said, in nm and ascending, and the curves over them.
+///
+/// # Errors
+///
+/// What is wrong with them, in words.
+pub(super) fn in_nm(
+    mut wavelengths: Vec<f64>,
+    values: Array2<f64>,
+    unit: Option<WavelengthUnit>,
+) -> std::result::Result<(Vec<f64>, Array2<f64>), String> {
+    unit.map_or(Ok(()), |unit| check_stated(&wavelengths, unit))?;
+    let unit = unit.unwrap_or(WavelengthUnit::Nanometer);
+    wavelengths.iter_mut().for_each(|wavelength| *wavelength = unit.nm(*wavelength));
+    check_order(&wavelengths)?;
+    let (wavelength_nm, values) = sorted(wavelengths, values);
+    check_nm(&wavelength_nm)?;
+    Ok((wavelength_nm, values))
+}
+
+/// Wavelengths in ascending order, and the curves over them.
+fn sorted(wavelength_nm: Vec<f64>, values: Array2<f64>) -> (Vec<f64>, Array2<f64>) {
+    if wavelength_nm.is_sorted() {
+        return (wavelength_nm, values);
+    }
+    let mut order: Vec<usize> = (0..wavelength_nm.len()).collect();
+    order.sort_by(|a, b| wavelength_nm[*a].total_cmp(&wavelength_nm[*b]));
+    (order.iter().map(|place| wavelength_nm[*place]).collect(), values.select(Axis(1), &order))
 }

@@ -1,6 +1,8 @@
 //! What the heading of a column says about the unit of its numbers: as people write it, beside names, brackets and factors.
 
-use super::spectral::{Found, OtherUnit, Stated, as_written, units_among};
+use super::other::OtherUnit;
+use super::quantity::{by_spelling, is_per_interval, names, quantity_named};
+use super::spectral::{Found, Stated, as_written, units_among};
 use super::spelling::{Base, Token, base, tokens};
 
 /// What the heading of a column says about the unit of its numbers; a name such as `irradiance` counts where there is no
@@ -40,14 +42,17 @@ fn changed(heading: &str) -> Option<OtherUnit> {
     if is_function || SIGNS.iter().any(|sign| heading.contains(sign)) {
         return Some(OtherUnit::Function);
     }
-    names(heading, &NORMALIZED).then_some(OtherUnit::Relative)
+    // A relative number of photons is none of radiances.
+    (names(heading, &NORMALIZED) && !names(heading, &PHOTONS)).then_some(OtherUnit::Relative)
 }
 
 const NORMALIZED: [&str; 3] = ["normalized", "normalised", "relative"];
 
 /// What a unit, or a name, is that is made of no powers of light.
 fn by_name(text: &str) -> OtherUnit {
-    if names(text, &PHOTOMETRIC) {
+    if let Some(kind) = quantity_named(text).or_else(|| by_spelling(text)) {
+        kind
+    } else if names(text, &PHOTOMETRIC) {
         OtherUnit::Photometric
     } else if names(text, &READINGS) {
         OtherUnit::Reading
@@ -60,6 +65,15 @@ fn by_name(text: &str) -> OtherUnit {
     }
 }
 
+/// Whether what names a ratio says no more than that it is in per cent.
+pub fn is_per_cent(text: &str) -> bool {
+    let is_percent = text.contains('%') || names(text, &PER_CENT);
+    is_percent && !names(text, &RATIOS.map(|word| if PER_CENT.contains(&word) { "" } else { word }))
+}
+
+/// Words for `%`.
+const PER_CENT: [&str; 2] = ["percent", "pct"];
+
 /// Whether a text says that numbers have no scale: `a.u.`, `arb. units`, `relative`.
 fn is_relative(text: &str) -> bool {
     const WORDS: [&str; 9] =
@@ -69,33 +83,30 @@ fn is_relative(text: &str) -> bool {
     WORDS.contains(&bare) || bare == "arbu" || bare == "relu"
 }
 
-/// Words for irradiance; all but the first are libRadtran's.
-const IRRADIANCES: [&str; 8] = ["irradiance", "irradiances", "edir", "eglo", "edn", "eup", "edif", "eglobal"];
+/// Words for irradiance; all but the first three are libRadtran's.
+const IRRADIANCES: [&str; 9] =
+    ["irradiance", "irradiances", "exitance", "edir", "eglo", "edn", "eup", "edif", "eglobal"];
 /// libRadtran's words for means over directions.
 const MEANS: [&str; 6] = ["uavg", "uavgdir", "uavgdn", "uavgup", "uavgdif", "uavgglo"];
 const RADIANCE: [&str; 2] = ["radiance", "radiances"];
 /// Units of light as the eye weights it.
 const PHOTOMETRIC: [&str; 10] = ["lm", "lumen", "lumens", "cd", "candela", "candelas", "lx", "lux", "nit", "nits"];
 /// Words for shares of light, and their unit.
-const RATIOS: [&str; 9] = [
+const RATIOS: [&str; 10] = [
     "reflectance",
     "reflectances",
     "reflectivity",
     "transmittance",
     "transmission",
     "albedo",
-    "absorbance",
+    "absorptance",
+    "absorptivity",
     "percent",
     "pct",
 ];
 /// Units of what an instrument reads.
 const READINGS: [&str; 10] = ["counts", "count", "cts", "dn", "adu", "v", "mv", "uv", "volt", "volts"];
 const PHOTONS: [&str; 3] = ["photon", "photons", "quanta"];
-
-/// Whether one of some words stands in a heading.
-fn names(heading: &str, words: &[&str]) -> bool {
-    tokens(heading).iter().filter_map(Token::lower).any(|word| words.contains(&word.as_str()))
-}
 
 /// The same, where the name and the unit do not contradict each other.
 fn of_name_and_unit(heading: &str) -> Option<Stated> {
@@ -133,6 +144,8 @@ fn of_name_and_unit(heading: &str) -> Option<Stated> {
             _ => None,
         })
     };
+    // `brightness temperature (K)`
+    let by_quantity = || quantity_named(heading).filter(|_| !names(heading, &RADIANCE)).and_then(named);
     let bracketed = in_brackets(heading);
     let in_brackets = || {
         let text = bracketed.filter(|text| looks_like_a_unit(text))?;
@@ -148,8 +161,10 @@ fn of_name_and_unit(heading: &str) -> Option<Stated> {
     });
     let found = found.map(|says| match (says, bracketed) {
         // Part of a unit is none: `(W/m2/xy/nm)`.
-        (Stated::Other { kind: OtherUnit::Irradiance | OtherUnit::AllWavelengths, .. }, Some(text))
-            if self::tokens(text).iter().any(Token::is_strange) =>
+        (Stated::Other { kind, .. }, Some(text))
+            if [OtherUnit::Irradiance, OtherUnit::AllWavelengths, OtherUnit::Intensity, OtherUnit::Power]
+                .contains(&kind)
+                && self::tokens(text).iter().any(Token::is_strange) =>
         {
             Stated::Other { text: text.to_owned(), kind: OtherUnit::Unknown }
         }
@@ -158,7 +173,7 @@ fn of_name_and_unit(heading: &str) -> Option<Stated> {
     // `radiance_w_m2_sr_um`: powers that nobody tells from places.
     let in_name = || whole(OtherUnit::Unknown).filter(|_| names_unit_in_words(heading));
     let in_full = || whole(OtherUnit::Unknown).filter(|_| is_bare_unit(heading));
-    found.or_else(in_words).or_else(in_brackets).or_else(in_name).or_else(in_full)
+    found.or_else(by_quantity).or_else(in_words).or_else(in_brackets).or_else(in_name).or_else(in_full)
 }
 
 /// Whether a heading without brackets is nothing but a unit: a word for levels or for light as the eye weights it, `dB`, or a word
@@ -204,7 +219,7 @@ fn is_beside_factor(found: &Found, text: &str, tokens: &[Token]) -> bool {
         let left = if has_power { left.trim_end_matches(|c: char| "x×*·1 ".contains(c)) } else { left };
         has_digits(left) || has_digits(right)
     });
-    is_told || text.contains('%') || before.iter().chain(after).any(scales)
+    is_told || text.contains('%') || is_per_interval(text) || before.iter().chain(after).any(scales)
 }
 
 /// Whether a piece beside a unit, in the same brackets, may be a factor: a number, a word with one, or a letter or prefix alone.
@@ -276,7 +291,7 @@ fn beside_factor(heading: &str, outside: &str) -> Option<Stated> {
     let is_large = |text: &str| {
         is_power(text) || text.parse::<f64>().is_ok_and(|factor| factor >= 10.0 || factor > 0.0 && factor < 1.0)
     };
-    if is_multiple_of_name(outside) {
+    if is_multiple_of_name(outside) || is_per_interval(heading) {
         return Some(Stated::Other { text: heading.trim().to_owned(), kind: OtherUnit::BesideFactor });
     }
     let is_sign = |place: usize| words.get(place).is_some_and(|word| ["x", "*"].contains(word));
@@ -392,6 +407,7 @@ fn looks_like_a_unit(text: &str) -> bool {
         |token: &Token| !has_numbers && matches!(token, Token::Per | Token::Factor { exponent: Some(_), .. });
     let is_named = |token: &Token| token.lower().is_some_and(|word| NAMED.contains(&word.as_str()));
     text.contains('%')
+        || ["K", "OD"].contains(&text)
         || text.eq_ignore_ascii_case("a.u.")
         || tokens.iter().any(is_power)
         || tokens.first().is_some_and(is_named)
@@ -583,12 +599,14 @@ mod tests {
 
     #[test]
     fn ratios_readings_and_energies_are_told() {
-        use OtherUnit::{AllWavelengths, Energy, Irradiance, PerCentimeter, PerFrequency, Ratio, Reading, Unknown};
+        use OtherUnit::{
+            AllWavelengths, Energy, Irradiance, PerCentimeter, PerFrequency, PerIrradiance, Ratio, Reading, Unknown,
+        };
         for (text, kind) in [
             ("transmittance", Ratio),
             ("reflectance (%)", Ratio),
             ("Reflectance", Ratio),
-            ("Rrs, remote sensing reflectance (sr-1)", Ratio),
+            ("Rrs, remote sensing reflectance (sr-1)", PerIrradiance),
             ("L [percent]", Ratio),
             ("transmission, %", Ratio),
             ("radiance (W m-2 sr-1)", AllWavelengths),
@@ -613,7 +631,8 @@ mod tests {
     #[test]
     fn other_units_are_told_from_radiances() {
         use OtherUnit::{
-            AllWavelengths, Irradiance, PerCentimeter, PerFrequency, Photons, Relative, Scaled, Several, Unknown,
+            AllWavelengths, Intensity, Irradiance, Megawatt, PerCentimeter, PerFrequency, Photons, Relative, Scaled,
+            Several, Unknown,
         };
         for (text, kind) in [
             ("irradiance (W m-2 nm-1)", Irradiance),
@@ -645,15 +664,15 @@ mod tests {
             ("radiance (100 W cm-2 sr-1 nm-1)", Scaled),
             ("radiance (1000 W m-2 sr-1 nm-1)", Scaled),
             ("3 × 10⁻³ W m⁻² sr⁻¹ nm⁻¹", Scaled),
-            ("W sr-1 nm-1", Unknown),
-            ("radiance (MW m-2 sr-1 nm-1)", Unknown),
-            ("radiance (MW/m2)", Unknown),
+            ("W sr-1 nm-1", Intensity),
+            ("radiance (MW m-2 sr-1 nm-1)", Megawatt),
+            ("radiance (MW/m2)", Megawatt),
             ("sky [a.u.]", Relative),
             ("L (arb. units)", Relative),
             ("lamp (relative)", Relative),
             ("L (flick)", Unknown),
             ("radiance (W/m2/xy/nm)", Unknown),
-            ("MW m-2 sr-1 nm-1", Unknown),
+            ("MW m-2 sr-1 nm-1", Megawatt),
             ("radiance_w_m2_sr_um", Unknown),
             ("Lw_W_m2_sr_um", Unknown),
             ("radiance_uW_cm2_sr_nm", Unknown),

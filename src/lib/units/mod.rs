@@ -4,13 +4,16 @@
 //! cd m⁻². Every conversion stands here; a bare power of ten elsewhere is a defect.
 
 mod heading;
+mod other;
+mod quantity;
 mod spectral;
 mod spelling;
 mod wavelength;
 pub mod written;
 
-pub use heading::unit_of_heading;
-pub use spectral::{OtherUnit, RadianceUnit, Stated, units_in};
+pub use heading::{is_per_cent, unit_of_heading};
+pub use other::OtherUnit;
+pub use spectral::{RadianceUnit, Stated, units_in};
 pub use wavelength::WavelengthUnit;
 
 use crate::names::{Named, serde_by_name};

@@ -3,6 +3,7 @@
 //! `W m-2 sr-1 nm-1`, `W/(m2 sr nm)`, `W·m⁻²·sr⁻¹·nm⁻¹`, `mW m^-2 sr^-1 nm^-1`, `uW/cm2/sr/nm`, `w_per_m2_sr_nm`, in any
 //! order, alone or among other words; and with energies over time, `erg s-1 cm-2 sr-1 A-1`. What follows a slash or `per` is divided by.
 
+use super::other::OtherUnit;
 use super::spelling::{Base, Length, Power, Token, base, tokens};
 use super::wavelength::WavelengthUnit;
 use std::fmt;
@@ -89,107 +90,6 @@ pub enum Stated {
         /// What it is.
         kind: OtherUnit,
     },
-}
-
-/// What a unit is that is none of spectral radiance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OtherUnit {
-    /// Power per area, from all directions.
-    Irradiance,
-    /// Photons instead of energy.
-    Photons,
-    /// Per interval of frequency, or of what is wavenumber.
-    PerFrequency,
-    /// Per centimeter, which may be one of wavelength or 1 cm⁻¹ of wavenumber.
-    PerCentimeter,
-    /// Radiance over all wavelengths.
-    AllWavelengths,
-    /// With a number before it.
-    Scaled,
-    /// A radiance beside which a factor stands.
-    BesideFactor,
-    /// Two units of radiance.
-    Several,
-    /// A mean over all directions, as libRadtran's `uavg`.
-    Mean,
-    /// Behind what divides stand steradians or lengths that no power or stroke makes divisors: `W m-2 sr nm`.
-    Undivided,
-    /// A unit of radiance beside the name of another quantity, or the unit of another beside the name of radiance.
-    Contradiction,
-    /// Of light as the eye weights it.
-    Photometric,
-    /// Energy instead of power: a radiance summed over time.
-    Energy,
-    /// A share, or a ratio to other light: reflectance, transmittance, per cent.
-    Ratio,
-    /// What an instrument reads: counts, codes, volts.
-    Reading,
-    /// Of no scale: arbitrary units, relative values.
-    Relative,
-    /// A logarithm or a root of radiance.
-    Function,
-    /// None that is known.
-    Unknown,
-}
-
-impl OtherUnit {
-    /// What it is, in words.
-    pub fn in_words(self) -> &'static str {
-        match self {
-            Self::Irradiance => "an irradiance, which has no sr-1",
-            Self::Photons => "a unit of photons, not of energy",
-            Self::PerFrequency => "per interval of frequency or wavenumber, not of wavelength",
-            Self::PerCentimeter => {
-                "per cm, of wavelength as it is written; per cm-1 of wavenumber is `/ cm-1`, as in `W m-2 sr-1 / cm-1`"
-            }
-            Self::AllWavelengths => "a radiance over all wavelengths, which has no nm-1",
-            Self::Scaled => "a unit with a number before it",
-            Self::BesideFactor => {
-                "a radiance beside a factor that may be in the values already or not; say what they are in as they stand"
-            }
-            Self::Several => "two units of radiance; say in which they are",
-            Self::Mean => "a mean over all directions, not the radiance of one",
-            Self::Undivided => {
-                "times sr or a length as it is written; what divides has a power, as in `W m-2 sr-1 nm-1`, or stands behind a stroke"
-            }
-            Self::Contradiction => "the name of one quantity beside the unit of another, one of which is wrong",
-            Self::Photometric => "of light as the eye weights it, from which no spectrum of energy follows",
-            Self::Energy => "of energy, a radiance summed over time, which has no s-1",
-            Self::Ratio => "a ratio, not the radiance itself",
-            Self::Reading => "what an instrument reads, not what that means",
-            Self::Relative => "of no scale, which does not tell how bright the light is",
-            Self::Function => "a logarithm or a root, not the radiance itself",
-            Self::Unknown => "no unit of spectral radiance that is known",
-        }
-    }
-
-    /// What makes spectral radiances of such numbers, in words; none of what may be them already.
-    pub fn conversion(self) -> Option<&'static str> {
-        Some(match self {
-            Self::Irradiance => {
-                "take those of one direction from where these come from; of a matt white surface they are the irradiance over pi"
-            }
-            Self::Mean => "take those of one direction from where these come from",
-            Self::Photons => "multiply each value by the energy of its photons, h c / wavelength",
-            Self::PerFrequency => "of a radiance per Hz multiply each value by c / wavelength^2",
-            Self::AllWavelengths => "divide the value of each band by the width of the band in nm",
-            Self::Photometric => "take the spectrum from where these come from",
-            Self::Energy => "divide each value by the time in s",
-            Self::Ratio => {
-                "multiply each value, as a fraction of 1, by the radiance that a perfect white, or no filter, has in the same light"
-            }
-            Self::Reading => "multiply each value by the calibration of the instrument",
-            Self::Function => "of log10 take 10^value, of ln e^value, of sqrt value^2",
-            Self::PerCentimeter
-            | Self::Scaled
-            | Self::BesideFactor
-            | Self::Several
-            | Self::Undivided
-            | Self::Contradiction
-            | Self::Relative
-            | Self::Unknown => return None,
-        })
-    }
 }
 
 /// The units of radiance, or of what may be taken for it, that a text names, first to last.
@@ -293,11 +193,22 @@ pub(super) fn units_among(tokens: &[Token]) -> Vec<Found> {
             // Two numbers are no scale.
             let is_one = begin < 2 || number(begin - 2).is_none();
             let from = if scale.is_some() { begin - 1 } else { begin };
+            let says = product(&tokens[begin..end]);
+            // What divides and is not known is part of it: `W/km2/sr/nm`, `W/m2/sr/5nm`.
+            if matches!(says, Err(OtherUnit::Unknown | OtherUnit::AllWavelengths)) && tokens[end - 1] == Token::Per {
+                let is_part = |place: &usize| match &tokens[*place] {
+                    Token::Per | Token::Square => true,
+                    Token::Factor { .. } | Token::Number(_) if tokens[*place - 1] == Token::Per => !heads(*place),
+                    Token::Factor { .. } => known(*place).is_some() && !heads(*place),
+                    Token::Number(_) | Token::End => false,
+                };
+                end += (end..tokens.len()).take_while(is_part).count();
+            }
             let text = shown(&tokens[from..end]);
             let scaled = |unit: RadianceUnit, scale: &str| {
                 unit.power.times(scale).filter(|_| is_one).map(|power| RadianceUnit { power, ..unit })
             };
-            let says = match (scale, product(&tokens[begin..end])) {
+            let says = match (scale, says) {
                 (None, Ok(unit)) => Stated::Radiance(unit),
                 (Some(scale), Ok(unit)) => {
                     scaled(unit, scale).map_or(Stated::Other { text, kind: OtherUnit::Scaled }, Stated::Radiance)
@@ -363,6 +274,9 @@ fn product(tokens: &[Token]) -> Result<RadianceUnit, OtherUnit> {
         }
         (-1, [(area, -2)]) if is_area(*area) => Err(OtherUnit::AllWavelengths),
         (0, [(area, -2), ..] | [(area, -3)]) if is_area(*area) => Err(OtherUnit::Irradiance),
+        (-1, []) => Err(OtherUnit::Intensity),
+        (-1, [(length, -1)]) if !is_area(*length) => Err(OtherUnit::Intensity),
+        (0, [(length, -1)]) if !is_area(*length) => Err(OtherUnit::Power),
         _ => Err(OtherUnit::Unknown),
     }
 }
@@ -455,7 +369,7 @@ mod tests {
     use crate::units::heading::unit_of_heading;
 
     /// Spellings, and what one such unit is in W cm⁻² sr⁻¹ nm⁻¹.
-    const RADIANCES: [(&str, f64); 82] = [
+    const RADIANCES: [(&str, f64); 86] = [
         ("W cm-2 sr-1 nm-1", 1.0),
         ("W m-2 sr-1 nm-1", 1e-4),
         ("W.m^-2.sr^-1.nm^-1", 1e-4),
@@ -491,6 +405,10 @@ mod tests {
         ("μW cm⁻² sr⁻¹ nm⁻¹", 1e-6),
         ("uW cm-2 sr-1 nm-1", 1e-6),
         ("nW cm-2 sr-1 nm-1", 1e-9),
+        ("pW cm-2 sr-1 nm-1", 1e-12),
+        ("GW m-2 sr-1 um-1", 1e2),
+        ("W/sqm/sr/nm", 1e-4),
+        ("mW sqcm-1 srad-1 nm-1", 1e-3),
         ("kW m-2 sr-1 um-1", 1e-4),
         ("W/m²/sr/µm", 1e-7),
         ("W m-2 sr-1 um-1", 1e-7),
@@ -558,6 +476,15 @@ mod tests {
         }
         for unit in RadianceUnit::USUAL {
             assert_eq!(RadianceUnit::parse(&unit.to_string()), Some(unit));
+        }
+    }
+
+    #[test]
+    fn units_of_unknown_pieces_are_shown_whole() {
+        for (heading, written) in [("radiance (W/km2/sr/nm)", "W/km2/sr/nm"), ("radiance (W/m2/sr/5nm)", "W/m2/sr/5nm")]
+        {
+            let found = unit_of_heading(heading);
+            assert!(matches!(&found, Some(Stated::Other { text, .. }) if text == written), "{heading}: {found:?}");
         }
     }
 }

@@ -244,12 +244,23 @@ fn piece(text: &str) -> Token {
             Token::Number(number.to_owned())
         }
         ("", _) => Token::End,
+        ("sqm" | "sqcm" | "sqmm", _) => square(&word[2..], power),
         (_, "") => Token::Factor { word: word.to_owned(), exponent: None },
         (_, power) => match power.parse() {
             Ok(exponent) => Token::Factor { word: word.to_owned(), exponent: Some(exponent) },
             Err(_) => Token::End,
         },
     }
+}
+
+/// The square of a length, `sqm`, or what divides by it, `sqm-1`.
+fn square(length: &str, power: &str) -> Token {
+    let exponent = match power {
+        "" => 2,
+        "-1" => -2,
+        _ => return Token::End,
+    };
+    Token::Factor { word: length.to_ascii_lowercase(), exponent: Some(exponent) }
 }
 
 /// What a factor of a unit measures.
@@ -278,6 +289,8 @@ pub(super) fn base(word: &str) -> Option<Base> {
         "mw" | "milliwatt" => Base::Power(Power::Milliwatt),
         "uw" | "microwatt" => Base::Power(Power::Microwatt),
         "nw" | "nanowatt" => Base::Power(Power::Nanowatt),
+        "pw" if word == "pW" => Base::Power(Power::TenTo(-12)),
+        "gw" if word == "GW" => Base::Power(Power::TenTo(9)),
         "ph" | "photon" | "quanta" | "quantum" | "mol" | "mmol" | "umol" | "nmol" | "mole" | "micromole"
         | "einstein" => Base::Photons,
         // As `Ue`, it is a name.
@@ -291,7 +304,7 @@ pub(super) fn base(word: &str) -> Option<Base> {
         "mm" | "millimeter" | "millimetre" => Base::Length(Length::Millimeter),
         "cm" | "centimeter" | "centimetre" => Base::Length(Length::Centimeter),
         "m" | "meter" | "metre" => Base::Length(Length::Meter),
-        "sr" | "str" | "ster" | "steradian" => Base::SolidAngle,
+        "sr" | "str" | "srad" | "ster" | "steradian" => Base::SolidAngle,
         "s" | "sec" | "second" => Base::Time,
         "hz" | "thz" => Base::Frequency,
         "ev" | "electronvolt" => Base::ElectronVolt,

@@ -85,6 +85,11 @@ impl WavelengthUnit {
         if words().any(|word| matches!(word.as_str(), "hz" | "thz")) {
             return Err("frequencies");
         }
+        // `12 pm` is a time.
+        let is_length = |word: String| ["wavelength", "lambda", "wl"].iter().any(|begin| word.starts_with(begin));
+        if tokens.last().and_then(Token::lower).as_deref() == Some("pm") && words().any(is_length) {
+            return Err("wavelengths in picometers");
+        }
         if words().any(|word| matches!(word.as_str(), "freq" | "frequency")) {
             return Err("frequencies (if they are wavenumbers, as MODTRAN calls them, write `FREQ (cm-1)`)");
         }
@@ -148,6 +153,7 @@ mod tests {
             ("E/eV", Some(WavelengthUnit::ElectronVolt)),
             ("eV", Some(WavelengthUnit::ElectronVolt)),
             ("wavelength", None),
+            ("12 pm", None),
             ("A", None),
             ("id", None),
         ] {
@@ -162,6 +168,7 @@ mod tests {
             "E (keV)",
             "wavelength (cm)",
             "lambda_mm",
+            "wavelength (pm)",
         ] {
             assert!(WavelengthUnit::of_heading(heading).is_err(), "{heading}");
         }

@@ -7,6 +7,7 @@ use crate::cfa::{Class, FilterArray};
 use crate::error::{Error, Result};
 use crate::formats::csv::SpectralTable;
 use crate::formats::digest::sha256;
+use crate::formats::quantities::Share;
 use crate::formats::response_table::{ResponseTable, TOLD_AT_AN_END, ends_early};
 use crate::names::Named;
 use crate::spectrum::{Curve, WavelengthGrid};
@@ -45,8 +46,8 @@ impl Curves<'_> {
         let cover_glass = match &mut files.cover_glass {
             Some(glass) => {
                 let (name, bytes) = self.bytes(glass)?;
-                let transmittance = SpectralTable::parse(&name, &bytes)?.curve(glass.column.as_deref())?;
-                Some(within_unit(self.sensor, "cover_glass", transmittance)?)
+                let table = SpectralTable::parse(&name, &bytes)?;
+                Some(self.share(&table, glass.column.as_deref(), Share::Transmittance)?)
             }
             None => None,
         };
@@ -66,7 +67,7 @@ impl Curves<'_> {
     fn absolute(&self, curve: &mut CurveFile) -> Result<Option<[Curve; 3]>> {
         let (name, bytes) = self.bytes(curve)?;
         let efficiencies = SpectralTable::parse(&name, &bytes)?;
-        let class = |column: Option<&str>| within_unit(self.sensor, "quantum_efficiency", efficiencies.curve(column)?);
+        let class = |column: Option<&str>| self.share(&efficiencies, column, Share::QuantumEfficiency);
         if self.array.is_none_or(FilterArray::has_three_classes) {
             return Ok(Some([class(Some("R"))?, class(Some("G"))?, class(Some("B"))?]));
         }
@@ -78,6 +79,19 @@ impl Curves<'_> {
             class(Some(&filter.to_string()))?;
         }
         Ok(None)
+    }
+
+    /// A column of a table of efficiencies or transmittances, which says nothing else of itself.
+    fn share(&self, table: &SpectralTable, column: Option<&str>, share: Share) -> Result<Curve> {
+        let index = table.column_index(column)?;
+        if let Some(problem) = table.stated(index).and_then(|stated| share.problem(&table.columns[index], stated)) {
+            return Err(Error::format(table.name(), problem));
+        }
+        let key = match share {
+            Share::QuantumEfficiency => "quantum_efficiency",
+            Share::Transmittance => "cover_glass",
+        };
+        within_unit(self.sensor, key, table.curve_at(index)?)
     }
 
     /// Relative responses, which are of R, G and B alone.
@@ -115,7 +129,13 @@ fn doubt_of_ends(classes: &[Curve; 3], cover_glass: Option<&Curve>) -> Option<St
 fn within_unit(sensor: &str, key: &str, curve: Curve) -> Result<Curve> {
     let (low, high) = curve.extremes();
     if low < 0.0 || high > 1.0 {
-        let per_cent = if low >= 0.0 && high <= 100.0 { ", and looks like per cent: divide it by 100" } else { "" };
+        /// From here on it is no fraction that is a little too large.
+        const PER_CENT: f64 = 2.0;
+        let per_cent = if low >= 0.0 && (PER_CENT..=100.0).contains(&high) {
+            ", and looks like per cent: divide it by 100"
+        } else {
+            ""
+        };
         let problem = format!("`{key}` runs from {low} to {high}; it must lie within 0 and 1{per_cent}");
         return Err(Error::format(sensor, problem));
     }

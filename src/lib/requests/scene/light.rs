@@ -7,6 +7,7 @@ use crate::formats::input::FrameReader;
 use crate::formats::radiance_unit::{Brightness, times_white};
 use crate::formats::spectral::SpectralChannels;
 use crate::frame::to_sample;
+use crate::metadata::FrameHeader;
 use crate::numerics::planes::{WeightedPlane, weighted_sums};
 use crate::requests::notes::Note;
 use crate::stages::render::Rendering;
@@ -109,10 +110,10 @@ impl SceneImage {
 
     /// Gives the electrons of the next `rows` rows to `take`, band by band.
     fn fold(&mut self, rows: usize, mut take: impl FnMut(&Band, Vec<Electrons>)) -> Result<()> {
-        let (pixels, first, name) = (&self.pixels, self.rows_read, self.reader.header().name.clone());
+        let (pixels, first, source) = (&self.pixels, self.rows_read, Named::of(self.reader.header()));
         self.rows_read += rows;
         fold([&mut self.reader as &mut dyn RowSource], rows, |band| {
-            take(band, pixels.electrons(band, first, &name)?);
+            take(band, pixels.electrons(band, first, &source)?);
             Ok(())
         })
     }
@@ -124,10 +125,10 @@ impl SceneImage {
         sink: &mut dyn RowSink,
         mut draw: impl FnMut(&Band, Vec<Electrons>, &mut Outlet<'_>) -> Result<()>,
     ) -> Result<()> {
-        let (pixels, first, name) = (&self.pixels, self.rows_read, self.reader.header().name.clone());
+        let (pixels, first, source) = (&self.pixels, self.rows_read, Named::of(self.reader.header()));
         self.rows_read += rows;
         fold_into([&mut self.reader as &mut dyn RowSource], rows, sink, |band, outlet| {
-            draw(band, pixels.electrons(band, first, &name)?, outlet)
+            draw(band, pixels.electrons(band, first, &source)?, outlet)
         })
     }
 
@@ -171,8 +172,8 @@ impl SceneImage {
 
 impl Pixels {
     /// The electrons of the rows of a band; the first that could be in it is row `first` of the image.
-    fn electrons(&self, band: &Band, first: usize, name: &str) -> Result<Vec<Electrons>> {
-        let window = band.window::<Any>(0);
+    fn electrons(&self, band: &Band, first: usize, source: &Named) -> Result<Vec<Electrons>> {
+        let (window, name) = (band.window::<Any>(0), source.name.as_str());
         let of_row = |y: usize| {
             let row = match self {
                 Self::Spectral(planes, _) => {
@@ -182,13 +183,51 @@ impl Pixels {
                 }
                 Self::Colored(picture) => picture.electrons(window.all_channels(y), window.width(), first + y, name)?,
             };
-            let row = row.into_iter().map(|electrons| checked(electrons, name)).collect::<Result<_>>()?;
+            let at = |x: usize| match self {
+                Self::Spectral(planes, _) => {
+                    let sample = |plane: usize| window.all_channels(y)[plane * window.width() + x];
+                    source.pixel([x, first + y], planes.iter().map(|weighted| weighted.plane), sample)
+                }
+                Self::Colored(_) => source.pixel([x, first + y], [], |_| 0.0),
+            };
+            let of_pixel = |(x, electrons)| checked_at(electrons, name, || at(x));
+            let row = row.into_iter().enumerate().map(of_pixel).collect::<Result<_>>()?;
             if let Self::Spectral(_, Some(judged)) = self {
                 judged.see(window.all_channels(y), window.width())?;
             }
             Ok(row)
         };
         band.rows().into_par_iter().map(of_row).collect()
+    }
+}
+
+/// What messages call an image and its channels.
+struct Named {
+    name: String,
+    channels: Vec<String>,
+}
+
+impl Named {
+    fn of(header: &FrameHeader) -> Self {
+        Self { name: header.name.clone(), channels: header.geometry.channels.clone() }
+    }
+
+    /// Where something is wrong: a pixel, from 0, and the first of its planes whose sample is no finite number.
+    fn pixel(
+        &self,
+        [x, y]: [usize; 2],
+        planes: impl IntoIterator<Item = usize>,
+        sample: impl Fn(usize) -> f32,
+    ) -> String {
+        let wrong = planes.into_iter().find(|plane| !sample(*plane).is_finite());
+        let channel = wrong.and_then(|plane| {
+            Some(format!(
+                ", where its channel {} is {}; write a radiance there",
+                self.channels.get(plane)?,
+                sample(plane)
+            ))
+        });
+        format!(" at pixel {x},{y}{}", channel.unwrap_or_default())
     }
 }
 
@@ -214,16 +253,25 @@ pub(super) fn no_sample(name: &str, sample: usize, count: usize) -> Error {
 
 /// Electrons that can be.
 pub(super) fn checked(electrons: [f64; 3], name: &str) -> Result<[f64; 3]> {
+    checked_at(electrons, name, String::new)
+}
+
+/// The same of a place in a file.
+fn checked_at(electrons: [f64; 3], name: &str, place: impl Fn() -> String) -> Result<[f64; 3]> {
     if let Some(e) = electrons.into_iter().find(|e| !(0.0..f64::INFINITY).contains(e)) {
         let what = match e {
             _ if e < 0.0 => "negative, summed over what a class of photosites sees",
             _ if e > 0.0 => "endless at this exposure",
             _ => "no finite number",
         };
-        return Err(Error::format(name, format!("its radiance is {what}: no electrons can be expected of it")));
+        let problem = format!("its radiance is {what}: no electrons can be expected of it{}", place());
+        return Err(Error::format(name, problem));
     }
     match electrons.into_iter().find(|e| *e > f64::from(f32::MAX)) {
-        Some(e) => Err(Error::format(name, format!("its radiance makes {e:.1e} electrons, more than a sample holds"))),
+        Some(e) => {
+            let problem = format!("its radiance makes {e:.1e} electrons, more than a sample holds{}", place());
+            Err(Error::format(name, problem))
+        }
         None => Ok(electrons),
     }
 }
@@ -297,5 +345,22 @@ impl Light {
                 Ok((Self::Image { rows: ImageRows::Kept(kept), factor, width, height, source }, brightest))
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_that_are_no_numbers_are_told_by_their_place() {
+        let source = Named { name: "a.exr".into(), channels: vec!["S0.400nm".into(), "S0.500nm".into()] };
+        let samples = [1.0, f32::NAN];
+        let at = source.pixel([3, 2], [0, 1], |plane| samples[plane]);
+        assert_eq!(at, " at pixel 3,2, where its channel S0.500nm is NaN; write a radiance there");
+        let told = checked_at([1.0, f64::NAN, 1.0], "a.exr", || at.clone()).unwrap_err().to_string();
+        let wanted = "a.exr: its radiance is no finite number: no electrons can be expected of it at pixel 3,2, where";
+        assert!(told.starts_with(wanted), "{told}");
+        assert_eq!(source.pixel([0, 0], [0], |_| 1.0), " at pixel 0,0");
     }
 }

@@ -199,6 +199,10 @@ impl Scene {
                         .radiance_unit(0, self.spectrum.radiance_unit)
                         .map_err(|error| beside(error, first, &likely))?;
                 }
+                if let Some(what) = table.uvspec() {
+                    let problem = format!("{}: {what}, or choose one with --column NAME or --sample N", table.name());
+                    return Err(Error::Usage(problem));
+                }
                 let names: Vec<&str> = table.columns.iter().take(SHOWN).map(String::as_str).collect();
                 let more = if count > SHOWN { " ..." } else { "" };
                 Err(Error::Usage(format!(
