@@ -46,8 +46,9 @@ impl Curve {
             besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
             let missed = misfit(0.0);
             let is_beyond = missed > freedom && significance::of_chi_square(missed, freedom) < LEVEL;
+            let weights = weighted(besides).weights;
             self.gain_error = is_beyond.then(|| (besides / largest).sqrt());
-            self.weights = weighted(besides).weights;
+            self.weights = weights;
         }
         for &flat in &self.fitted {
             self.flats[flat].variance.variance += besides;
