@@ -23,7 +23,7 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
             let hint = in_words(meant(&argument, command, words).or_else(|| near_option(&argument, command)));
             let hint = output_hint(&argument, command, words).map_or(hint, |output| format!("; {output}"));
             let hint = in_quotes(&argument, command, words).map_or(hint, |quoted| format!("; write {quoted}"));
-            let hint = if argument == "--list" { LISTS_OF_DATA.to_owned() } else { hint };
+            let hint = if argument.strip_prefix("--") == Some("list") { LISTS_OF_DATA.to_owned() } else { hint };
             let argument = one_dash(&argument, words).unwrap_or(&argument);
             format!("unknown option or extra argument `{argument}`{hint}")
         }
@@ -177,8 +177,8 @@ fn near<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
     const LETTERS: usize = 4;
     let begins = |long: &str, short: &str| short.len() >= LETTERS && long.starts_with(short);
     let known = || known.iter().copied();
-    let longest_within = || known().filter(|name: &&str| begins(typed, *name)).max_by_key(|name| name.len());
-    let shortest_around = || known().filter(|name: &&str| begins(*name, typed)).min_by_key(|name| name.len());
+    let longest_within = || known().filter(|name: &&str| begins(typed, name)).max_by_key(|name| name.len());
+    let shortest_around = || known().filter(|name: &&str| begins(name, typed)).min_by_key(|name| name.len());
     // A letter of three may differ, of eight three.
     let farthest = |name: &str| (typed.chars().count().min(name.len()) + 1) / 3;
     nearest(typed, known(), farthest).or_else(longest_within).or_else(shortest_around)
@@ -306,9 +306,20 @@ mod tests {
         )
     }
 
+    fn check(cases: &[(&str, &str)]) {
+        for (line, wanted) in cases {
+            let words = std::iter::once("measure").chain(line.split(' '));
+            let error = command().try_get_matches_from(words).unwrap_err();
+            let joined = if wanted.ends_with('?') { " See" } else { "; see" };
+            let words: Vec<String> = line.split(' ').map(str::to_owned).collect();
+            let said = one_line("measure", &error, &command(), &words);
+            assert_eq!(said, format!("{wanted}{joined} `measure --help`"), "{line}");
+        }
+    }
+
     #[test]
     fn clap_says_what_is_expected_of_it() {
-        for (line, wanted) in [
+        check(&[
             ("--outptu a", "unknown option or extra argument `--outptu`; did you mean `--output`?"),
             ("a b --output c", "unknown option or extra argument `b`"),
             ("--sides 3x4 a b --output c", "unknown option or extra argument `b`"),
@@ -331,6 +342,12 @@ mod tests {
             ("--share=0,033", "`0,033` is no value for --share <share>: a number is wanted; write 0.033"),
             ("-f0,033 --sides 3", "`0,033` is no value for --share <share>: a number is wanted; write 0.033"),
             ("--share 1,000,5", "`1,000,5` is no value for --share <share>: a number is wanted"),
+        ]);
+    }
+
+    #[test]
+    fn words_that_were_taken_for_others_are_told() {
+        check(&[
             (
                 "--three 1,5;2,5;3",
                 "`1,5;2,5;3` is no value for --three <three>: give three numbers between commas; write 1.5,2.5,3",
@@ -377,13 +394,6 @@ mod tests {
             ),
             ("--output a --size 1", "2 values required for '--size <size> <size>' but 1 was provided"),
             ("--output a --level 1", "equal sign is needed when assigning values to '--level=<level>'"),
-        ] {
-            let words = std::iter::once("measure").chain(line.split(' '));
-            let error = command().try_get_matches_from(words).unwrap_err();
-            let joined = if wanted.ends_with('?') { " See" } else { "; see" };
-            let words: Vec<String> = line.split(' ').map(str::to_owned).collect();
-            let said = one_line("measure", &error, &command(), &words);
-            assert_eq!(said, format!("{wanted}{joined} `measure --help`"), "{line}");
-        }
+        ]);
     }
 }

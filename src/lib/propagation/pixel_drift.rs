@@ -29,13 +29,16 @@ pub(super) struct PixelDrift {
 
 /// The weights of each plane of a pixel, those that are fixed and those of its hue, by rows: its distance, and the sum of each class.
 #[derive(Debug, Clone, PartialEq)]
-struct RowWeights([[Vec<(isize, [f64; 3])>; 3]; 2]);
+struct RowWeights([[OfRows; 3]; 2]);
+
+/// The distances of rows, and the sums of the weights of each class there.
+type OfRows = Vec<(isize, [f64; 3])>;
 
 impl RowWeights {
     fn of(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
         let phase = phase_at(at, geometry);
         let by_rows = |stencil: &Stencil| {
-            let mut rows: Vec<(isize, [f64; 3])> = Vec::new();
+            let mut rows = OfRows::new();
             for (offset, weight) in stencil.folded(at, [geometry.width, geometry.height]).sites() {
                 let place = rows.iter().position(|(row, _)| *row == offset[1]).unwrap_or_else(|| {
                     rows.push((offset[1], [0.0; 3]));

@@ -377,7 +377,6 @@ impl Tally {
         let [of_rows, of_columns, rest] = [of_rows, of_columns, rest].map(|square| square.with_tails(fourth, n));
         let variance = all.max(0.0) / ((frames - 1.0) * (n - 2.0));
         let spatial = MeanSquares { rows: of_rows, columns: of_columns, rest };
-        let strangers = std::mem::take(&mut self.slopes).strangers(self.size, &spatial, &temporal);
         SiteSurvey {
             frames: self.frames,
             size: self.size,
@@ -389,11 +388,11 @@ impl Tally {
             at_top: if self.at_top.len() <= most_at_top(self.size) { self.at_top } else { Vec::new() },
             full: self.full.1,
             largest: (self.top == f64::INFINITY).then_some(self.largest),
+            strangers: std::mem::take(&mut self.slopes).strangers(self.size, &spatial, &temporal),
             temporal,
             spatial,
             excess: excess(self.within, self.frames, n),
             neighbors: self.neighbors.finish(self.frames),
-            strangers,
             fourth,
             frame_means: drifts.iter().map(|drift| mean + drift).collect(),
             copies,
