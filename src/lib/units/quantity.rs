@@ -164,7 +164,6 @@ mod tests {
         for text in [
             "radiance (watts per square meter per steradian per nanometer)",
             "radiance (W m-2 sr-1 nm-1), band 5",
-            "sky (90/45) [W m-2 sr-1 nm-1]",
             "spectral_radiance_w_per_m2_sr_nm",
         ] {
             assert!(matches!(unit_of_heading(text), Some(Stated::Radiance(_))), "{text}");
