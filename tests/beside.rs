@@ -251,7 +251,7 @@ fn levels_of_coarse_codes_and_of_unknown_times_have_room() {
         coarse("dark.fits", level, 40.0, 2);
         let told = shop.said(line, 0);
         assert_eq!(
-            told.contains("by the frame's sensor dark frames have 542.1 ADU at most"),
+            told.contains("by the frame's sensor dark frames have 542.0 ADU at most"),
             is_told,
             "{level}: {told}"
         );

@@ -166,71 +166,9 @@ fn what_is_nothing_may_be_said() {
     assert_eq!(parse_sensor("s", said.as_bytes()).unwrap(), parse_sensor("s", plain.as_bytes()).unwrap());
 }
 
-#[test]
-fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
-    let parts = format!("{HEAD}{READOUT}{RESPONSE}{MATRIX}");
-    for (text, right, wrong, complaint) in [
-        (&parts, "name:", "nmae:", "unknown key `nmae`; did you mean `name`?"),
-        (&parts, "  prnu:", "  pnru:", "unknown key `readout.pnru`; did you mean `readout.prnu`?"),
-        (
-            &parts,
-            "  cover_glass:",
-            "  coverglass:",
-            "unknown key `response.coverglass`; did you mean `response.cover_glass`?",
-        ),
-        (&parts, "source: nowhere", "bits: 14", "unknown key `bits`; did you mean `readout.bits`?"),
-        (
-            &parts,
-            "  bits: 14",
-            "  cover_glass: 14",
-            "unknown key `readout.cover_glass`; did you mean `response.cover_glass`?",
-        ),
-        (&parts, "source: nowhere", "read_noise: 3", "unknown key `read_noise`; did you mean `readout.read_noise_e`?"),
-        (&parts, "source: nowhere", "observer: me", "unknown key `observer`"),
-        (
-            &parts,
-            "{file: qe.csv}",
-            "{file: qe.csv, color: R}",
-            "`response` has an unknown key `quantum_efficiency`; remove it",
-        ),
-        (&parts, "sensor/2", "sensor/1", "`readout` belongs to the schema `cyanometer-sensor/2`; name that one"),
-        (
-            &parts,
-            "sensor/2",
-            "sensor/3",
-            "schema is `cyanometer-sensor/3`, not `cyanometer-sensor/2` or `cyanometer-sensor/1`",
-        ),
-        (&FLAT.to_owned(), "prnu:", "pnru:", "unknown key `pnru`; did you mean `prnu`?"),
-        (
-            &FLAT.to_owned(),
-            "source: nowhere",
-            "read_noise: 3",
-            "unknown key `read_noise`; did you mean `read_noise_e`?",
-        ),
-        (
-            &FLAT.to_owned(),
-            "source: nowhere",
-            "dsnu_e: 3",
-            "unknown key `dsnu_e`; it is one of the schema `cyanometer-sensor/2`, where it stands in `readout`",
-        ),
-        (
-            &FLAT.to_owned(),
-            "source: nowhere",
-            "read_noise_adu: 3",
-            "unknown key `read_noise_adu`; here it is `read_noise_e`, in e-, ADU over `adu_per_e`",
-        ),
-        (
-            &parts,
-            "prnu: 0",
-            "prnu_percent: 0",
-            "unknown key `readout.prnu_percent`; here it is `prnu`, a fraction of 1, per cent over 100",
-        ),
-        (&FLAT.to_owned(), "sensor/1", "sensor/2", "unknown key `width`; did you mean `readout.width`?"),
-        (&FLAT.to_owned(), "cfa: gbrg", "cfa: monochrome", "`cfa` is `monochrome`; known are"),
-        (&parts, "cfa: gbrg", "cfa: rgbw", "in `readout.cfa`, `rgbw` is no filter array; one is rggb"),
-        (&parts, "bits: 14", "bits: 0", "`bits` is 0; it must be 1 to 16"),
-        (&parts, "width: 12", "width: wide", "`readout.width` is `wide`, not a whole number from 0 on"),
-    ] {
+/// Texts of a sensor file with one word in place of another, and the complaint.
+fn check_complaints(text: &str, cases: &[(&str, &str, &str)]) {
+    for (right, wrong, complaint) in cases {
         assert!(text.contains(right), "{right}");
         let text = text.replace(right, wrong);
         let found = parse_sensor("s.yaml", text.as_bytes());
@@ -240,6 +178,52 @@ fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
         let ends = !complaint.contains("unknown key") || error.ends_with(complaint);
         assert!(ends, "{error}\n{complaint}");
     }
+}
+
+#[test]
+fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
+    let cases = [
+        ("name:", "nmae:", "unknown key `nmae`; did you mean `name`?"),
+        ("  prnu:", "  pnru:", "unknown key `readout.pnru`; did you mean `readout.prnu`?"),
+        ("  cover_glass:", "  coverglass:", "unknown key `response.coverglass`; did you mean `response.cover_glass`?"),
+        ("source: nowhere", "bits: 14", "unknown key `bits`; did you mean `readout.bits`?"),
+        ("  bits: 14", "  cover_glass: 14", "unknown key `readout.cover_glass`; did you mean `response.cover_glass`?"),
+        ("source: nowhere", "read_noise: 3", "unknown key `read_noise`; did you mean `readout.read_noise_e`?"),
+        ("source: nowhere", "observer: me", "unknown key `observer`"),
+        ("{file: qe.csv}", "{file: qe.csv, color: R}", "`response` has an unknown key `quantum_efficiency`; remove it"),
+        ("sensor/2", "sensor/1", "`readout` belongs to the schema `cyanometer-sensor/2`; name that one"),
+        ("sensor/2", "sensor/3", "schema is `cyanometer-sensor/3`, not `cyanometer-sensor/2` or `cyanometer-sensor/1`"),
+        (
+            "prnu: 0",
+            "prnu_percent: 0",
+            "unknown key `readout.prnu_percent`; here it is `prnu`, a fraction of 1, per cent over 100",
+        ),
+        ("cfa: gbrg", "cfa: rgbw", "in `readout.cfa`, `rgbw` is no filter array; one is rggb"),
+        ("bits: 14", "bits: 0", "`bits` is 0; it must be 1 to 16"),
+        ("width: 12", "width: wide", "`readout.width` is `wide`, not a whole number from 0 on"),
+    ];
+    check_complaints(&format!("{HEAD}{READOUT}{RESPONSE}{MATRIX}"), &cases);
+}
+
+#[test]
+fn an_unknown_key_of_the_first_schema_is_answered_too() {
+    let cases = [
+        ("prnu:", "pnru:", "unknown key `pnru`; did you mean `prnu`?"),
+        ("source: nowhere", "read_noise: 3", "unknown key `read_noise`; did you mean `read_noise_e`?"),
+        (
+            "source: nowhere",
+            "dsnu_e: 3",
+            "unknown key `dsnu_e`; it is one of the schema `cyanometer-sensor/2`, where it stands in `readout`",
+        ),
+        (
+            "source: nowhere",
+            "read_noise_adu: 3",
+            "unknown key `read_noise_adu`; here it is `read_noise_e`, in e-, ADU over `adu_per_e`",
+        ),
+        ("sensor/1", "sensor/2", "unknown key `width`; did you mean `readout.width`?"),
+        ("cfa: gbrg", "cfa: monochrome", "`cfa` is `monochrome`; known are"),
+    ];
+    check_complaints(FLAT, &cases);
 }
 
 /// Each program with a sensor that lacks what it needs: the command, and its complaint.
