@@ -4,11 +4,12 @@ use super::frame::{FramePrediction, Sites};
 use super::lines::Axis;
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
-use super::repeated::is_linear;
+use super::repeated::{is_linear, without_fixed};
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::frame::Geometry;
 use crate::metadata::{AdcRecord, AverageRecord, FrameHeader};
 use crate::numerics::averages::Combine;
+use crate::stages::noise::NoiseModel;
 
 /// Why nothing is said of exposures of what is curved.
 const CURVED_APART: &str = "what of the scatter is fixed is told of what is linear in the samples of photosites alone: not of smooth \
@@ -73,14 +74,10 @@ impl Photosite {
     fn hangs_on_lines(&self, expected_e: [f64; 3], geometry: &Geometry, frames: u32) -> bool {
         const NEGLIGIBLE: f64 = 0.06;
         let Some(adc) = self.adc.filter(|_| !self.has_tails() && self.flat.is_none()) else { return false };
-        let mut fixed = self.model;
-        for line in [&mut fixed.lines.dsnu_row_e, &mut fixed.lines.dsnu_column_e] {
-            *line = 0.0;
-        }
-        (fixed.lines.prnu_row, fixed.lines.prnu_column) = (0.0, 0.0);
+        let model = NoiseModel { lines: without_fixed(self.model.lines), ..self.model };
         let of = |class: usize, offset_e: f64, gain: f64| {
             let adc = AdcRecord { bias_adu: adc.bias_adu + adc.adu_per_e * offset_e, ..adc };
-            let site = Self { model: fixed, adc: Some(adc), ..*self };
+            let site = Self { model, adc: Some(adc), ..*self };
             site.temporal(class, gain * expected_e[class], false).variance
         };
         let shows = |axis: Axis| {

@@ -19,6 +19,15 @@ pub(super) struct PixelLines {
     photosite: Photosite,
 }
 
+/// What photosites share at some level.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AtLevel {
+    /// The covariances of pairs of classes in a row, then in a column, less the drift of these.
+    shared: [f64; 2 * PAIRS.len()],
+    /// The slopes of the samples of each class to the charge.
+    slopes: [f64; 3],
+}
+
 impl PixelLines {
     /// Of the photosites of a frame, an average or not, of which such places are the kinds of pixels.
     pub fn of(
@@ -38,8 +47,8 @@ impl PixelLines {
         }
     }
 
-    /// The covariances of pairs of classes at levels above black, less the drift of that, and the slopes of their samples to the charge.
-    fn at(&self, level: [f64; 3]) -> ([f64; 2 * PAIRS.len()], [f64; 3]) {
+    /// What photosites share at levels above black.
+    pub fn at(&self, level: [f64; 3]) -> AtLevel {
         let full_well_e = self.photosite.model.full_well_e;
         // `max` drops what is no number.
         let expected_e = level.map(|level| self.photosite.expected_at(level.max(0.0)).max(0.0).min(full_well_e));
@@ -50,12 +59,11 @@ impl PixelLines {
             let [k, l] = PAIRS[index % PAIRS.len()];
             slopes[k] * slopes[l] * self.terms[index / PAIRS.len()].at(x[k], x[l])
         });
-        (shared, slopes)
+        AtLevel { shared, slopes }
     }
 
     /// What photosites of such levels share with others, of their variance.
-    pub fn of_sites(&self, level: [f64; 3]) -> [f64; 3] {
-        let (shared, slopes) = self.at(level);
+    pub fn of_sites(&self, AtLevel { shared, slopes }: &AtLevel) -> [f64; 3] {
         std::array::from_fn(|class| {
             let own = PAIRS.iter().position(|pair| *pair == [class, class]).unwrap_or_default();
             let drift = self.drift.as_ref().map_or(0.0, |drift| drift.of_site(slopes[class]));
@@ -64,12 +72,11 @@ impl PixelLines {
     }
 
     /// What of the covariance of a pixel of a kind, in a row of the frame, photosites of such levels make by what they share.
-    pub fn covariance(&self, kind: usize, row: usize, level: [f64; 3], hues: Option<[f64; 3]>) -> Covariance {
-        let (shared, slopes) = self.at(level);
-        let of_lines = self.gains[kind].covariance(shared, hues);
+    pub fn covariance(&self, kind: usize, row: usize, level: &AtLevel, hues: Option<[f64; 3]>) -> Covariance {
+        let of_lines = self.gains[kind].covariance(level.shared, hues);
         match &self.drift {
             Some(drift) => {
-                let of_drift = drift.covariance(kind, row, slopes, hues);
+                let of_drift = drift.covariance(kind, row, level.slopes, hues);
                 std::array::from_fn(|pair| of_lines[pair] + of_drift[pair])
             }
             None => of_lines,

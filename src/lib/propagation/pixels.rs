@@ -197,7 +197,8 @@ impl PixelNoise {
         let kind = self.rows.kind(y) * self.columns.examples.len() + self.columns.kind(x);
         let level = rgb.map(|sample| sample - self.black);
         let all = |mut variances: [f64; 3], hues: Option<[f64; 3]>| {
-            if let Some(lines) = &self.of_lines {
+            let lines = self.of_lines.as_ref().map(|lines| (lines, lines.at(level)));
+            if let Some((lines, level)) = &lines {
                 let shared = lines.of_sites(level);
                 variances
                     .iter_mut()
@@ -208,7 +209,7 @@ impl PixelNoise {
                 Some(taps) => taps.gains[kind].covariance(taps.at(level), hues),
                 None => self.gains[kind].covariance(variances, hues),
             };
-            if let Some(lines) = &self.of_lines {
+            if let Some((lines, level)) = &lines {
                 let more = lines.covariance(kind, y, level, hues);
                 covariance.iter_mut().zip(more).for_each(|(covariance, more)| *covariance += more);
             }

@@ -99,6 +99,11 @@ pub(super) fn average_of(
     Ok(record.average())
 }
 
+/// What rows and columns have anew in each exposure.
+pub(super) fn without_fixed(lines: LineNoise) -> LineNoise {
+    LineNoise { dsnu_row_e: 0.0, dsnu_column_e: 0.0, prnu_row: 0.0, prnu_column: 0.0, ..lines }
+}
+
 /// Whether an average is the mean of its frames.
 fn is_mean(record: &AverageRecord) -> bool {
     kept(record.combine, record.frames, record.clip.unwrap_or(CLIP), 16.0) == Kept::of_mean(record.frames)
@@ -162,9 +167,7 @@ impl Photosite {
     pub(super) fn temporal_of(&self, expected_e: [f64; 3]) -> Predicted<[Temporal; 3]> {
         let lines = if self.has_lines() {
             let mut one = Self { darks: [None; MOST_DARKS], flat: None, ..*self };
-            let temporal =
-                LineNoise { dsnu_row_e: 0.0, dsnu_column_e: 0.0, prnu_row: 0.0, prnu_column: 0.0, ..self.model.lines };
-            one.model.lines = temporal;
+            one.model.lines = without_fixed(one.model.lines);
             one.lines(expected_e)?
         } else {
             [LineCovariance::default(); 3]

@@ -1,6 +1,6 @@
 //! What may make the numbers of a camera wrong, as its levels show it.
 
-use super::curve::{Bend, Curve, below_saturation};
+use super::curve::{BEYOND_FIVE, Bend, Curve, below_saturation};
 use super::level::Level;
 use super::suspects::Suspect;
 use super::tally::SiteSurvey;
@@ -9,7 +9,7 @@ use crate::numerics::quantiles::of_student;
 /// So many standard deviations are beyond chance.
 const BEYOND: f64 = 5.0;
 /// The confidence of an interval of as many.
-const CONFIDENCE: f64 = 1.0 - 5.7e-7;
+const CONFIDENCE: f64 = 1.0 - BEYOND_FIVE;
 /// Signals of levels differ by so large a share where one is of more light.
 const LEAST_STEP: f64 = 0.01;
 /// Signals that miss the line of the response by so large a share are told of.
@@ -204,20 +204,14 @@ mod tests {
     use super::super::findings::of_class;
     use super::super::level::{Condition, Level};
     use super::super::settings::Settings;
+    use super::super::strangers::tests::normal;
     use super::super::survey::survey;
     use crate::frame::{Geometry, to_sample};
     use crate::metadata::{FrameHeader, Metadata};
-    use crate::random::philox::philox4x32_10;
     use crate::stream::MemoryFrame;
     use crate::units::QuantityKind;
 
     const SIDE: usize = 64;
-
-    /// A number of mean 0 and variance 1: the sum of 12 uniform ones.
-    fn normal(place: usize, frame: u32, key: u32) -> f64 {
-        let words = (0..3).flat_map(|part| philox4x32_10([u32::try_from(place).unwrap(), frame, part, key], [8, 9]));
-        words.map(|word| f64::from(word) / 4_294_967_296.0).sum::<f64>() - 6.0
-    }
 
     /// Two frames of a camera of black 200, half a code to an electron and a noise of 2 codes, whose codes are changed so.
     fn level(signal: f64, time_s: f64, key: u32, change: &dyn Fn(f64) -> f64) -> Level {

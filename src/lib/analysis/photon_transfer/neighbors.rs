@@ -85,20 +85,14 @@ fn note(sums: &mut [f64; 3], value: f64) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::strangers::tests::normal;
     use super::super::survey::survey;
     use crate::frame::{Geometry, to_sample};
     use crate::metadata::{FrameHeader, Metadata};
-    use crate::random::philox::philox4x32_10;
     use crate::stream::MemoryFrame;
     use crate::units::QuantityKind;
 
     const SIDE: usize = 64;
-
-    /// A number of mean 0 and variance 1: the sum of 12 uniform ones.
-    fn normal(place: usize, frame: u32, key: u32) -> f64 {
-        let words = (0..3).flat_map(|part| philox4x32_10([u32::try_from(place).unwrap(), frame, part, key], [8, 9]));
-        words.map(|word| f64::from(word) / 4_294_967_296.0).sum::<f64>() - 6.0
-    }
 
     /// The correlations, and their standard deviations, of frames of such samples.
     fn found(count: u32, sample: impl Fn(usize, u32) -> f64) -> [[f64; 2]; 2] {

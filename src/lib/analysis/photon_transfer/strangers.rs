@@ -94,7 +94,7 @@ pub fn excess([sum, squares]: [f64; 2], frames: usize, count: f64) -> [f64; 2] {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::survey::survey;
     use crate::frame::{Geometry, to_sample};
     use crate::metadata::{FrameHeader, Metadata};
@@ -105,7 +105,7 @@ mod tests {
     const SIDE: usize = 64;
 
     /// A number of mean 0 and variance 1: the sum of 12 uniform ones.
-    fn normal(place: usize, frame: u32, key: u32) -> f64 {
+    pub fn normal(place: usize, frame: u32, key: u32) -> f64 {
         let words = (0..3).flat_map(|part| philox4x32_10([u32::try_from(place).unwrap(), frame, part, key], [8, 9]));
         words.map(|word| f64::from(word) / 4_294_967_296.0).sum::<f64>() - 6.0
     }

@@ -23,14 +23,14 @@ const TELLING: i64 = 16;
 
 /// The step of whole numbers: the largest power of two that all differences are multiples of.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Steps {
+pub(super) struct Steps {
     range: Option<[i64; 2]>,
     bits: u64,
     has_others: bool,
 }
 
 impl Steps {
-    fn take(&mut self, samples: impl Iterator<Item = f64>) {
+    pub fn take(&mut self, samples: impl Iterator<Item = f64>) {
         for sample in samples {
             let whole = sample.round();
             if (sample - whole).abs() > 1e-3 || whole.abs() > 1e15 {
@@ -43,6 +43,16 @@ impl Steps {
             self.bits |= whole.abs_diff(low);
             self.range = Some([low.min(whole), high.max(whole)]);
         }
+    }
+
+    /// The step, however few the numbers are; 1 where some are not whole.
+    pub fn least(&self) -> f64 {
+        if self.bits == 0 || self.has_others { 1.0 } else { f64::from(self.bits.trailing_zeros()).exp2() }
+    }
+
+    /// Whether it is 1 whatever more numbers are.
+    pub fn is_one(&self) -> bool {
+        self.has_others || self.bits & 1 == 1
     }
 
     /// The step; none of few numbers, and where some are not whole.
@@ -149,8 +159,7 @@ impl Fitness {
 
     /// The step that all codes of the frame lie apart by, however few they are; 1 where some are no whole numbers.
     pub(super) fn step_of_frame(&self) -> f64 {
-        let [Steps { bits, has_others, .. }, _] = self.steps;
-        if bits == 0 || has_others { 1.0 } else { f64::from(bits.trailing_zeros()).exp2() }
+        self.steps[0].least()
     }
 
     /// Whether codes of the darks lie multiples of a power of two apart, however few they are.

@@ -1,6 +1,6 @@
 //! Dark frames that are read in step with the frame that they come off.
 
-use super::fitness::{Fitness, Misfit};
+use super::fitness::{Fitness, Misfit, Steps};
 use super::stack::{DarkSettings, DarkStack, Master};
 use crate::error::Result;
 use crate::frame::to_sample;
@@ -253,7 +253,7 @@ impl<S: RowSource> DarkFrames<S> {
         let survey = || Survey::new(classes.count(), width * geometry.height);
         let [mut levels, mut scatters] = [survey(), survey()];
         let has_scatter = self.keep_scatter();
-        let (factor, mut step) = (self.factor(), 0);
+        let (factor, mut steps) = (self.factor(), Steps::default());
         while self.rows_made < geometry.height {
             let first = self.rows_made;
             self.next(geometry.cached_rows().min(geometry.height - first))?;
@@ -262,8 +262,8 @@ impl<S: RowSource> DarkFrames<S> {
                 for (x, dark) in line.iter().enumerate() {
                     let class = of_row[x % of_row.len()];
                     levels.take(class, *dark);
-                    if let Some(factor) = factor.filter(|_| step != 1) {
-                        step = common_divisor(step, whole(dark * factor));
+                    if let Some(factor) = factor.filter(|_| !steps.is_one()) {
+                        steps.take(std::iter::once(dark * factor));
                     }
                     if has_scatter {
                         scatters.take(class, self.masters[0].scatter()[index * width + x].cbrt());
@@ -276,7 +276,7 @@ impl<S: RowSource> DarkFrames<S> {
         let count = self.masters.first().map_or(2, |master| master.frames().count().max(2)) as f64;
         let scatters = has_scatter.then(|| {
             let limits = scatters.limits(beyond, 1e-3);
-            limits.into_iter().map(|limits| of_variances(limits, beyond, count, step.max(1) as f64)).collect()
+            limits.into_iter().map(|limits| of_variances(limits, beyond, count, steps.least())).collect()
         });
         Ok(DarkLimits { levels, scatters, classes })
     }
@@ -321,16 +321,6 @@ fn of_variances([low, high]: [f64; 2], beyond: f64, count: f64, step: f64) -> [f
     let by_chance = center * (1.0 + beyond * (2.0 / (9.0 * (count - 1.0))).sqrt());
     let between_codes = 0.25 * step * step * count / (count - 1.0);
     [low, (high.max(by_chance).powi(3) + between_codes).cbrt()]
-}
-
-/// A sum of codes.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates; its sign does not matter")]
-fn whole(sum: f64) -> u64 {
-    sum.abs().round() as u64
-}
-
-fn common_divisor(a: u64, b: u64) -> u64 {
-    if b == 0 { a } else { common_divisor(b, a % b) }
 }
 
 /// Frames from which on their scatter tells unstable photosites.

@@ -21,6 +21,7 @@ pub use ends::{
     LEAST_VARIANCE, are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, stuck_shares,
     without_clipped, without_stuck,
 };
+pub use weights::BEYOND_FIVE;
 
 use super::fit::{Line, Point};
 use super::level::{Level, SAME_TIME, is_same_time};

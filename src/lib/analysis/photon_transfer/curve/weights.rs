@@ -6,11 +6,12 @@ use super::{Curve, Datum, Point4, Weights};
 use crate::numerics::significance;
 use crate::text::in_digits;
 
+/// The probability to be beyond 5 standard deviations of a normal law.
+pub const BEYOND_FIVE: f64 = 5.7e-7;
+
 impl Curve {
     /// Weights, from the first fit on at its levels; what points miss their lines by is added to what they scatter by.
     pub(super) fn weigh(&mut self) {
-        /// Less likely is beyond chance: 5 standard deviations.
-        const LEVEL: f64 = 5.7e-7;
         self.weigh_darks();
         let fitted: Vec<Point4> = self.fitted.iter().map(|&flat| self.flats[flat].clone()).collect();
         let relative = relative_scatter(&fitted);
@@ -45,7 +46,7 @@ impl Curve {
             let largest = self.fitted.iter().map(|&flat| self.noise(flat).powi(2)).fold(0.0, f64::max);
             besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
             let missed = misfit(0.0);
-            let is_beyond = missed > freedom && significance::of_chi_square(missed, freedom) < LEVEL;
+            let is_beyond = missed > freedom && significance::of_chi_square(missed, freedom) < BEYOND_FIVE;
             let weights = weighted(besides).weights;
             self.gain_error = is_beyond.then(|| (besides / largest).sqrt());
             self.weights = weights;
