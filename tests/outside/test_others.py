@@ -330,6 +330,37 @@ class Described(Others):
             self.assertEqual((found["min"], found["max"]), (part.min(), part.max()), name)
             self.refused(["measure", name, *options, "--crop", "30,3,8,6"], "within the frame of 37x23", status=BAD_USAGE)
 
+    def test_what_another_program_changed_is_told(self):
+        chain = (["mosaic"], ["add-noise"], ["digitize"])
+        light = self.run_program(["render-radiance", "--electrons", "9000,8000,7000", "--size", "24x16"])
+        for end in ("tiff", "exr", "png"):
+            own = f"own.{end}"
+            words = ["digitize", "-o", own, *(["--viewable"] if end == "png" else [])]
+            self.run_pipe(*chain[:2], words, stdin=light)
+            (self.directory / f"{own}.yaml").unlink()
+            other = f"other.{end}"
+            for change, wanted in (
+                ([], None),
+                (["--cut", "15x9+1+0"], "15x9 pixels"),
+                (["--rotate90"], "16x24 pixels"),
+                (["--rotate180"], "changed them"),
+                (["--flop"], "changed them"),
+                (["--mulc", "1.5"], "changed them"),
+                (["--powc", "0.4545"], "changed them"),
+                (["--resize", "12x8"], "12x8 pixels"),
+                (["-d", "uint8"], "changed them"),
+            ):
+                if end == "exr" and change[:1] == ["-d"]:
+                    change = ["-d", "half", "--mulc", "1.01"]
+                oiiotool(self.directory / own, *change, "-o", self.directory / other)
+                for program in ("measure", "demosaic"):
+                    done = self.attempt([program, other, *(["-o", "out.exr"] if program == "demosaic" else [])])
+                    said = done.stderr.decode()
+                    if wanted is None:
+                        self.assertEqual(("changed" in said, done.returncode), (False, 0), (end, said))
+                    else:
+                        self.assertIn(wanted, said, (end, change))
+
     def test_images_of_several_pages(self):
         """tifffile leaves sixteen bytes that no tag names behind three pages; a second file behind the first is an error."""
         pages = np.stack([self.codes() + page for page in range(3)])

@@ -3,7 +3,7 @@
 use super::atomic::{AtomicFile, Target};
 use super::digest::SamplesDigest;
 use super::dng::{self, DngWriter};
-use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, XYZ_PRIMARIES};
+use super::exr::{self, ExrCompression, ExrSamples, ExrTags, ExrWriter, Layers, XYZ_PRIMARIES};
 use super::format::U16_FULL_SCALE;
 use super::icc;
 use super::interleave::{between_codes, nearest_u16};
@@ -17,7 +17,8 @@ use super::viewable::{self, Scaling, check_lossless};
 use super::yaml;
 use crate::color::{self, D65_XY, SRGB_PRIMARIES};
 use crate::error::{Error, Result};
-use crate::metadata::{FrameHeader, SamplesRecord};
+use crate::frame::Geometry;
+use crate::metadata::{FrameHeader, SamplesRecord, Seal};
 use crate::stream::{Counts, RowSink};
 use crate::text::visible;
 use crate::units::{QuantityKind, RELATIVE_UNIT};
@@ -60,12 +61,15 @@ pub struct FrameWriter {
     /// The digest of what a reader will get, and the sidecar; only for named files.
     record: Option<(SamplesDigest, AtomicFile)>,
     encoding: Encoding,
+    layers: Layers,
     scaling: Option<Scaling>,
     scaled: Vec<f32>,
     stored: Vec<f32>,
 }
 
 enum Encoder {
+    /// Nothing is written before the first row is there, whose digest stands ahead of it; none while the head is written.
+    Waiting(Option<Target>),
     Exr(Box<ExrWriter<Target>>),
     Tiff(Box<TiffWriter<Target>>),
     Dng(Box<DngWriter<Target>>),
@@ -93,28 +97,45 @@ impl FrameWriter {
         encoding.bytes(&header.geometry).map_or(Ok(()), |bytes| target.check_room(bytes, others))?;
         header.metadata.frames_to_come = follow.then_some(options.frames_to_come);
         header.metadata.file = header.metadata.file.filter(|_| target.named_file().is_none());
-        let header = &header;
         if matches!(encoding, Encoding::Exr(ExrSamples::F16, _)) {
-            doubt_of_codes(&name, header);
+            doubt_of_codes(&name, &header);
         }
         let sidecar = target.named_file().map(|path| AtomicFile::create(&sidecar_path(path))).transpose()?;
         let record = sidecar.map(|sidecar| (SamplesDigest::new(), sidecar));
+        // What cannot be written is told before anything is computed.
+        yaml::write_metadata(&header.metadata)?;
+        let scaling = Scaling::of(header.geometry.width, &header.geometry.channels, sample_scale);
+        let (scaled, stored) = (Vec::new(), Vec::new());
+        let (encoder, layers) = (Encoder::Waiting(Some(target)), options.layers()?);
+        Ok(Self { encoder, header, name, record, encoding, layers, scaling, scaled, stored })
+    }
+
+    /// Writes the head of the frame, which tells of the samples to store what a reader can hold them against.
+    fn begin(&mut self, samples: &[f32], to_store: &[f32]) -> Result<()> {
+        let Encoder::Waiting(target) = &mut self.encoder else { return Ok(()) };
+        let Some(target) = target.take() else { return Err(Error::Data(format!("{}: it was given up", self.name))) };
+        let Geometry { width, height, .. } = self.header.geometry;
+        let row = self.header.geometry.row_samples().min(samples.len());
+        let (mut digest, mut stored) = (SamplesDigest::new(), Vec::new());
+        digest.update_rows(self.as_read(&mut stored, &samples[..row], &to_store[..row]), &self.header.geometry);
+        self.header.metadata.seal = Some(Seal { size: [width, height], first_row: digest.finish() });
+        self.encoder = self.encoder_of(target)?;
+        Ok(())
+    }
+
+    /// Writes the head of the frame in its format.
+    fn encoder_of(&self, target: Target) -> Result<Encoder> {
+        let Self { name, header, encoding, .. } = self;
         let description = yaml::write_metadata(&header.metadata)?;
         let software = format!("cyanometer {}", env!("CARGO_PKG_VERSION"));
         let geometry = &header.geometry;
-        let encoder = match encoding {
+        let sample_scale = header.metadata.sample_scale.unwrap_or(1.0);
+        Ok(match *encoding {
             Encoding::Exr(samples, compression) => {
                 let (metadata, software) = (Some(description), Some(software));
                 let tags = ExrTags { metadata, software, ..native_tags(header) };
-                Encoder::Exr(Box::new(ExrWriter::create(
-                    target,
-                    &name,
-                    geometry,
-                    samples,
-                    compression,
-                    options.layers()?,
-                    &tags,
-                )?))
+                let writer = ExrWriter::create(target, name, geometry, samples, compression, self.layers, &tags)?;
+                Encoder::Exr(Box::new(writer))
             }
             Encoding::Tiff(samples, compression) => {
                 let scale = u16_scale(header.metadata.quantity, samples);
@@ -124,24 +145,21 @@ impl FrameWriter {
                 let extra = profile.into_iter().map(|value| ExtraTag { number: ICC_PROFILE, value }).collect();
                 let exif = dng::of_exposure(&header.metadata);
                 let settings = TiffSettings { samples, scale, compression, tags, extra, exif };
-                Encoder::Tiff(Box::new(TiffWriter::create(target, &name, geometry, settings)?))
+                Encoder::Tiff(Box::new(TiffWriter::create(target, name, geometry, settings)?))
             }
             Encoding::Dng(samples, compression) => {
                 let texts = [description, software];
-                Encoder::Dng(Box::new(DngWriter::create(target, &name, header, samples, compression, texts)?))
+                Encoder::Dng(Box::new(DngWriter::create(target, name, header, samples, compression, texts)?))
             }
             Encoding::Png => {
                 let scale = u16_scale(header.metadata.quantity, TiffSamples::U16);
                 let is_srgb = header.metadata.quantity == QuantityKind::Srgb;
                 let profile = icc::profile(header, sample_scale, f64::from(U16_FULL_SCALE))?;
-                let exif = exif_block(&dng::of_exposure(&header.metadata), &name)?;
+                let exif = exif_block(&dng::of_exposure(&header.metadata), name)?;
                 let settings = PngSettings { scale, is_srgb, description, software, profile, exif };
-                Encoder::Png(Box::new(PngWriter::create(target, &name, geometry, settings)?))
+                Encoder::Png(Box::new(PngWriter::create(target, name, geometry, settings)?))
             }
-        };
-        let scaling = Scaling::of(geometry.width, &geometry.channels, sample_scale);
-        let (scaled, stored) = (Vec::new(), Vec::new());
-        Ok(Self { encoder, header: header.clone(), name, record, encoding, scaling, scaled, stored })
+        })
     }
 
     /// Ends the frame: gives a named file its name, and writes its sidecar. Gives the number of samples that 16 bits could
@@ -150,9 +168,11 @@ impl FrameWriter {
     /// # Errors
     ///
     /// [`Error::Disk`]; the file is then not left behind.
-    pub fn finish(self, counts: Counts) -> Result<u64> {
+    pub fn finish(mut self, counts: Counts) -> Result<u64> {
+        self.begin(&[], &[])?;
         let mut did_not_fit = 0;
         let mut target = match self.encoder {
+            Encoder::Waiting(_) => return Err(Error::Data(format!("{}: it was given up", self.name))),
             Encoder::Exr(writer) => {
                 let (mut target, patch) = writer.finish()?;
                 if let Some(patch) = patch {
@@ -284,6 +304,7 @@ impl RowSink for FrameWriter {
         };
         self.check_f16(to_store)?;
         self.check_whole(samples)?;
+        self.begin(samples, to_store)?;
         self.update_digest(samples, to_store);
         self.encode(to_store)?;
         self.scaled = scaled;
@@ -347,8 +368,14 @@ impl FrameWriter {
 
     /// Adds rows to the digest of the samples as a reader will get them.
     fn update_digest(&mut self, samples: &[f32], to_store: &[f32]) {
-        let Some((digest, _)) = &mut self.record else { return };
-        let stored = &mut self.stored;
+        let Some((mut digest, sidecar)) = self.record.take() else { return };
+        let mut stored = std::mem::take(&mut self.stored);
+        digest.update_rows(self.as_read(&mut stored, samples, to_store), &self.header.geometry);
+        (self.stored, self.record) = (stored, Some((digest, sidecar)));
+    }
+
+    /// Samples as a reader will get them, with room for those that are others.
+    fn as_read<'a>(&self, stored: &'a mut Vec<f32>, samples: &'a [f32], to_store: &[f32]) -> &'a [f32] {
         stored.clear();
         match self.encoding {
             Encoding::Exr(ExrSamples::F16, _) => {
@@ -359,15 +386,17 @@ impl FrameWriter {
                 let scale = u16_scale(self.header.metadata.quantity, TiffSamples::U16);
                 stored.extend(samples.iter().map(|sample| f32::from(nearest_u16(sample * scale))));
             }
-            _ => return digest.update_rows(samples, &self.header.geometry),
+            _ => return samples,
         }
-        digest.update_rows(stored, &self.header.geometry);
+        stored
     }
 }
 
 impl FrameWriter {
     fn encode(&mut self, samples: &[f32]) -> Result<()> {
         match &mut self.encoder {
+            // The head is written before.
+            Encoder::Waiting(_) => Ok(()),
             Encoder::Exr(writer) => writer.write(samples),
             Encoder::Tiff(writer) => writer.write_rows(samples),
             Encoder::Dng(writer) => writer.write_rows(samples),

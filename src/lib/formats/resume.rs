@@ -37,5 +37,5 @@ pub fn is_complete(options: &OutputOptions, made: &FrameHeader) -> Result<bool> 
 
 /// What of the metadata is known before the samples are, and does not hang on how they are stored.
 fn lasting(metadata: Metadata) -> Metadata {
-    Metadata { samples: None, sample_scale: None, file: None, ..metadata }
+    Metadata { seal: None, samples: None, sample_scale: None, file: None, ..metadata }
 }

@@ -18,7 +18,7 @@ pub use difference::Difference;
 pub use header::FrameHeader;
 pub use records::{
     AdaptationRecord, CameraSettings, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
-    NoiseRecord, PoissonKind, PredictedRecord, ProfileRecord, RelativeMatrix, SamplesRecord, Scene, TakenAs,
+    NoiseRecord, PoissonKind, PredictedRecord, ProfileRecord, RelativeMatrix, SamplesRecord, Scene, Seal, TakenAs,
     UpsamplingRecord,
 };
 
@@ -174,6 +174,9 @@ pub struct Metadata {
     /// Which of several files the frame was read from, as the user named it, by the first program of a pipe; in streams alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
+    /// Which samples these metadata were written with. It stands in files and streams alone: of a frame that is read it was compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seal: Option<Seal>,
     /// What is known only after the last row; in sidecars alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub samples: Option<SamplesRecord>,
@@ -228,6 +231,7 @@ impl Metadata {
             sample_scale: None,
             frames_to_come: None,
             file: None,
+            seal: None,
             samples: None,
             unknown: Mapping::new(),
         }

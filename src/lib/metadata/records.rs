@@ -421,6 +421,16 @@ pub struct HistoryEntry {
     pub arguments: Vec<String>,
 }
 
+/// By what is known ahead of the last row, which samples metadata were written with: other programs crop, turn, scale and encode
+/// frames, and keep the metadata as they are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Seal {
+    /// Columns and rows of the stored frame.
+    pub size: [usize; 2],
+    /// The digest of the samples of the first row, as [`SamplesRecord::digest`] is that of all.
+    pub first_row: String,
+}
+
 /// What is known only after the last row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SamplesRecord {

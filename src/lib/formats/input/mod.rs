@@ -17,11 +17,10 @@ pub use options::{InputOptions, Linearizing, OfCamera};
 pub(crate) use time::TOO_DARK;
 
 use self::checks::Checks;
-use self::described::DigestCheck;
+use self::described::{DigestCheck, other_size};
 use self::kept::{LEFT_OUT, Taken, count_marks, cut, left_out};
-use self::metadata::{Found, doubt_of_marks, find_metadata, placed, take_scaling};
+use self::metadata::{Found, FoundIn, doubt_of_marks, find_metadata, placed, take_scaling};
 use self::opening::{head_of, is_file, of_upstream, open_piped, open_seekable, open_unseekable, readers_of};
-use super::digest::SamplesDigest;
 use super::dng::{DngReader, RawArea};
 use super::files::{named, open_named, spool};
 use super::format::{ColorTags, Rest, SampleReader, SampleType, U16_FULL_SCALE};
@@ -210,11 +209,12 @@ impl FrameReader {
         let kept = first_channel..first_channel + geometry.channels.len();
         let mask = stored.channels.iter().position(|of| of == MASK_LAYER).filter(|at| is_ours && !kept.contains(at));
         notes.extend(kept::left_out(name, left_out));
-        let check = metadata.samples.as_ref().zip(sidecar).map(|(samples, sidecar)| DigestCheck {
-            digest: SamplesDigest::like(&samples.digest),
-            expected: samples.digest.clone(),
-            sidecar: Some(sidecar),
-        });
+        let seal = metadata.seal.take().filter(|_| !matches!(place, FoundIn::Given(_)));
+        let mismatch = seal.as_ref().and_then(|seal| other_size(seal, stored, name));
+        // A digest is one of all samples.
+        let described = metadata.samples.as_ref().zip(sidecar).filter(|_| options.crop.is_none());
+        let whole = described.map(|(samples, by)| DigestCheck::of_all(samples, &by, stored));
+        let check = whole.or_else(|| seal.as_ref().map(DigestCheck::of_first_row)).filter(|_| mismatch.is_none());
         let is_unsigned = reader.stored_as().is_some_and(SampleType::is_unsigned);
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
         if let Some(file) = &metadata.file {
@@ -236,10 +236,9 @@ impl FrameReader {
             reader,
             header,
             rows_read: 0,
-            // A digest is one of all samples.
-            check: check.filter(|_| options.crop.is_none()),
+            check,
             checks: Checks::telling_top(options.tells_top && path.is_some()),
-            mismatch: None,
+            mismatch,
             buffer: Vec::new(),
             scaling,
             divisor,
@@ -349,7 +348,7 @@ impl FrameReader {
         self.reader.noise_profile()
     }
 
-    /// The warning that the sidecar describes other samples; none before the last row is in.
+    /// The warning that its metadata describe other samples; of the right size, none before the rows are in that they tell.
     pub fn mismatch(&self) -> Option<&str> {
         self.mismatch.as_deref()
     }
@@ -372,8 +371,7 @@ impl FrameReader {
         if reader.header.geometry != made.geometry || !is_stored_so {
             return Ok(false);
         }
-        let (expected, digest) = (digest.to_owned(), SamplesDigest::like(digest));
-        reader.check = Some(DigestCheck { expected, sidecar: None, digest });
+        reader.check = Some(DigestCheck::of_made(digest, reader.reader.geometry()));
         reader.drain()?;
         Ok(reader.mismatch.is_none())
     }
@@ -393,20 +391,33 @@ impl FrameReader {
         Ok(())
     }
 
+    /// Reads rows as they are stored behind those of `into`, but for the scale of viewers, and holds them against what describes them.
+    fn fetch(&mut self, rows: usize, into: &mut Vec<f32>) -> Result<()> {
+        let start = into.len();
+        let read = self.reader.read(rows, into);
+        read.map_err(|error| of_upstream(error, &self.header.name))?;
+        if let Some(scaling) = &self.scaling {
+            scaling.undo(&mut into[start..]);
+        }
+        let other = DigestCheck::take(&mut self.check, &into[start..], self.reader.geometry(), &self.header.name);
+        self.mismatch = self.mismatch.take().or(other);
+        Ok(())
+    }
+
     /// Reads rows above those that are kept.
     fn pass_over(&mut self, rows: usize, buffer: &mut Vec<f32>) -> Result<()> {
         let step = self.reader.geometry().step_rows(self.reader.natural_rows()).max(1);
         let mut left = rows;
         while left > 0 {
             buffer.clear();
-            self.reader.read(step.min(left), buffer)?;
+            self.fetch(step.min(left), buffer)?;
             left -= step.min(left);
         }
         buffer.clear();
         Ok(())
     }
 
-    /// Once the last row is in, hands on what lies behind it, and compares the digest.
+    /// Once the last row is in, hands on what lies behind it.
     fn end(&mut self) -> Result<()> {
         if self.rows_read < self.header.geometry.height {
             return Ok(());
@@ -425,9 +436,6 @@ impl FrameReader {
             }
             None if below == 0 => self.reader.rest()?.end(&self.header.name)?,
             None => {}
-        }
-        if let Some(check) = self.check.take() {
-            self.mismatch = check.end(&self.header.name);
         }
         self.checks.end(&self.header)
     }
@@ -464,14 +472,7 @@ impl RowSource for FrameReader {
         let start = if direct { first } else { 0 };
         let into: &mut Vec<f32> = if direct { samples } else { &mut buffer };
         into.truncate(start);
-        let read = self.reader.read(rows, into);
-        read.map_err(|error| of_upstream(error, &self.header.name))?;
-        if let Some(scaling) = &self.scaling {
-            scaling.undo(&mut into[start..]);
-        }
-        if let Some(check) = &mut self.check {
-            check.digest.update_rows(&into[start..], self.reader.geometry());
-        }
+        self.fetch(rows, into)?;
         if let Some(divisor) = self.divisor {
             into[start..].iter_mut().for_each(|sample| *sample /= divisor);
         }

@@ -212,6 +212,7 @@ mod tests {
                 ("uncertainty.", field_names::<Coverage>()),
                 ("left_out.", field_names::<LeftOut>()),
                 ("history.", field_names::<HistoryEntry>()),
+                ("seal.", field_names::<Seal>()),
                 ("samples.", field_names::<SamplesRecord>()),
             ],
         }
