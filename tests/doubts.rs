@@ -66,7 +66,7 @@ fn exposures_and_lenses_in_other_units_are_told_by_whatever_way_they_come() {
     assert!(said.contains(long) && said.contains(small), "{said}");
     let said = shop.said("measure plane.exr", 0);
     assert!(
-        said.contains("its exposure time in s is 33, but 0.033 in the file of the frame; the sidecar counts"),
+        said.contains("its `exposure.exposure_s` is 33.0, but 0.033 in the file of the frame; the sidecar counts"),
         "{said}"
     );
     fs::write(shop.path("short.yaml"), "schema: cyanometer/1\nquantity: adu\nexposure_time_s: 33.0\n").unwrap();

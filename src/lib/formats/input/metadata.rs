@@ -1,5 +1,6 @@
 //! The metadata of a frame: where they are found, and what in them is doubtful.
 
+use super::changed::changed_since;
 use crate::camera::levels::BlackLevel;
 use crate::camera::optics::doubt_of_time;
 use crate::cfa::FilterArray;
@@ -163,22 +164,6 @@ pub(super) fn placed(
 /// A warning of a time without an f-number that looks like another unit. Keywords and tags are in s by their standards.
 fn time_alone(metadata: &Metadata) -> Option<String> {
     metadata.exposure_time_s.and_then(doubt_of_time)
-}
-
-/// Warnings of what a sidecar says otherwise than the metadata that our program wrote into the frame's file: it was changed since.
-fn changed_since(sidecar: &Metadata, reader: &dyn SampleReader) -> Vec<String> {
-    let own = reader.embedded().and_then(|text| yaml::parse_metadata("", text).ok());
-    let Some(own) = own.filter(|own| !own.history.is_empty()) else { return Vec::new() };
-    let exposure = |metadata: &Metadata| metadata.exposure.map(|told| [told.exposure_s, told.f_number]);
-    let [told, written] = [exposure(sidecar), exposure(&own)];
-    let parts = told.zip(written).into_iter().flat_map(|(told, written)| {
-        let named = ["exposure time in s", "f-number"].into_iter().zip(told.into_iter().zip(written));
-        named.filter(|(_, (told, written))| told != written).collect::<Vec<_>>()
-    });
-    let said = |(what, (told, written))| {
-        format!("its {what} is {told}, but {written} in the file of the frame; the sidecar counts")
-    };
-    parts.map(said).collect()
 }
 
 /// Warnings of tags that say another thing than the metadata of ours which come with them: another program changed one of the two.

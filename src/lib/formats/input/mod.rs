@@ -1,6 +1,7 @@
 //! Opens frames of any format, from files and pipes, with the metadata that belongs to them.
 
 mod camera;
+mod changed;
 mod checks;
 mod codes;
 mod described;
