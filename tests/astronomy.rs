@@ -3,8 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use std::fs;
 use support::fits::{chance, write_fits, write_sensor};
 use support::workshop::{BAD_DATA, Workshop};

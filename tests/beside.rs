@@ -3,8 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::frame::to_sample;
 use std::fs;
 use support::fits::{chance, write_fits, write_sensor};

@@ -3,8 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::analysis::statistics::check::Verdict;
 use cyanometer::analysis::statistics::{Region, RegionReport, Saturated, measure};
 use cyanometer::color::{Space, White};

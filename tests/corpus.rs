@@ -10,8 +10,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use std::fs;
 use std::path::{Path, PathBuf};

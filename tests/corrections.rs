@@ -3,8 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::camera::optics::Vignetting;
 use cyanometer::camera::readout::silicon_band_gap_ev;
 use cyanometer::cfa::{CfaPattern, Class};

@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::camera::taps::{TapLayout, Taps};
 use cyanometer::stages::adc::{AdcSettings, Digitize};

@@ -3,8 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::analysis::statistics::{Saturated, measure};
 use cyanometer::frame::to_sample;
 use cyanometer::metadata::{AdcRecord, PoissonKind, Scene};

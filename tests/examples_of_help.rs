@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::cli::examples::{EXAMPLES, Example, of};
 use std::path::Path;
 use std::process::{Command, Output};

@@ -4,8 +4,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::analysis::characterization::Signals;
 use cyanometer::analysis::characterization::regression::{FitSettings, fit};
 use cyanometer::analysis::statistics::{Saturated, measure};
@@ -774,8 +773,8 @@ fn predicted_in(setup: &CameraSetup, light: [f64; 3]) -> Option<(f64, Option<Str
     })
 }
 
-/// How long predictions of random sensors take: `CYANOMETER_CAMERAS=2000 cargo test --release --test extremes
-/// predictions_take -- --ignored --nocapture`; CYANOMETER_FIRST is the number of the first; with CYANOMETER_TELL each is written out.
+/// How long predictions of random sensors take: `CYANOMETER_CAMERAS=2000 cargo test --release --test all predictions_take --
+/// --ignored --nocapture`; CYANOMETER_FIRST is the number of the first; with CYANOMETER_TELL each is written out.
 #[test]
 #[ignore = "a measurement"]
 fn predictions_take_milliseconds() {

@@ -420,6 +420,22 @@ fn programs_with_tests_are_tested() {
     }
 }
 
+/// What no program of tests includes would never run.
+#[test]
+fn every_file_of_tests_is_run() {
+    let place = PathBuf::from(TREE).join("tests");
+    let mut there: Vec<String> = fs::read_dir(&place)
+        .unwrap()
+        .filter_map(|entry| entry.unwrap().file_name().to_str()?.strip_suffix(".rs").map(str::to_owned))
+        .filter(|name| name != "all")
+        .collect();
+    there.sort_unstable();
+    let all = fs::read_to_string(place.join("all.rs")).unwrap();
+    let declared = all.lines().filter_map(|line| line.strip_prefix("mod ")?.strip_suffix(';'));
+    let declared: Vec<&str> = declared.filter(|name| *name != "support").collect();
+    assert_eq!(declared, there, "tests/all.rs and the files of tests differ");
+}
+
 /// A file has one subject; beyond this many lines before its tests it has several.
 const FILE_LINES: usize = 500;
 

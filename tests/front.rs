@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::cli::programs::{APART, PROGRAMS};
 use std::fs;
 use std::os::unix::process::CommandExt;

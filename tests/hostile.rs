@@ -3,8 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::error::Result;
 use cyanometer::formats::exr::{ExrCompression, ExrReader, ExrSamples, ExrTags, ExrWriter, Layers};
 use cyanometer::formats::fits::FitsReader;

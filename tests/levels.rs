@@ -3,8 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::analysis::statistics::{Report, Saturated, measure};
 use cyanometer::camera::levels::{BlackLevel, WhiteLevel};
 use cyanometer::cfa::{CfaPattern, Class, FilterArray};

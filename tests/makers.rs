@@ -3,8 +3,7 @@
 #![cfg(feature = "makers-raw")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::camera::levels::BlackLevel;
 use cyanometer::cfa::{CfaPattern, FilterArray};
 use cyanometer::stream::MemoryFrame;

@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::analysis::statistics::{Saturated, measure};
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::cfa::{CfaPattern, Class};

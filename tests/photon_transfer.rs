@@ -4,8 +4,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::analysis::photon_transfer::{ClassFindings, Condition, KEYS, Level, Settings, of_class, survey};
 use cyanometer::camera::optics::Exposure;
 use cyanometer::camera::readout::ReadOut;

@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::color::rgb::{Encoding, NamedPrimaries, xyz_from_rgb};
 use cyanometer::color::xyz_of_chromaticity;
 use cyanometer::formats::exr::{ExrCompression, ExrSamples, ExrTags, ExrWriter, Layers};

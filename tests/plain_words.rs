@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::analysis::characterization::CameraMatrix;
 use cyanometer::formats::keys::KeyPage;
 use cyanometer::formats::yaml::{parse_matrix, parse_metadata, parse_sensor, parse_strict};

@@ -1,7 +1,6 @@
 //! What figures of frames show: beside the prediction, and beside sums of a few lines.
 
-mod support;
-
+use crate::support;
 use cyanometer::analysis::statistics::portrait::{LAGS, Portrait};
 use cyanometer::analysis::statistics::{Laws, Region, Report, Saturated, measure_with_portrait};
 use cyanometer::frame::Geometry;

@@ -1,7 +1,6 @@
 //! What `preview` shows, looked at pixel by pixel.
 
-mod support;
-
+use crate::support;
 use cyanometer::color::ramp::ramp;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::formats::picture::{PictureSettings, Range, thumbnail};

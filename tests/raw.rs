@@ -5,8 +5,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::stream::MemoryFrame;
 use std::fs;
 use std::path::{Path, PathBuf};

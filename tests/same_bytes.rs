@@ -3,8 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use std::fs::{self, File};
 use std::process::{Output, Stdio};
 use support::dng::dng;

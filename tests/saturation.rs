@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::cfa::{CfaPattern, Class};
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::frame::Geometry;

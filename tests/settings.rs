@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::formats::yaml::{parse_metadata, parse_sensor, parse_sensor_at, settings_of};
 use std::fs;
 use support::workshop::Workshop;

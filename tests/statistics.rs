@@ -3,8 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::analysis::statistics::{ChannelReport, Saturated, measure};
 use cyanometer::cfa::Class;
 use cyanometer::metadata::{PoissonKind, Scene};

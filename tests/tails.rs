@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::analysis::statistics::{Region, RegionReport, Saturated, measure};
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::cfa::CfaPattern;
@@ -520,7 +519,7 @@ fn what_is_beyond_is_named() {
 }
 
 /// How fast noise is drawn, of a sensor without tails, with them, and with all that CMOS sensors have, in photosites per µs. Run
-/// by `cargo test --test tails speed -- --ignored --nocapture`.
+/// by `cargo test --test all tails::speed -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn speed() {

@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-mod support;
-
+use crate::support;
 use cyanometer::camera::optics::Exposure;
 use cyanometer::formats::chart::load_reference;
 use cyanometer::frame::{Geometry, to_sample};

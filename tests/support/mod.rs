@@ -1,6 +1,5 @@
 //! Frames to test with, and ways to drive them: shared by the tests of laws, statistics and programs.
 
-#![allow(dead_code, reason = "each file of tests takes what it needs")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
 pub mod advised;
