@@ -5,7 +5,7 @@
 
 use crate::support;
 use cyanometer::analysis::statistics::check::Verdict;
-use cyanometer::analysis::statistics::{Region, RegionReport, Saturated, measure};
+use cyanometer::analysis::statistics::{Laws, Region, RegionReport, Saturated, measure};
 use cyanometer::color::{Space, White};
 use cyanometer::metadata::Scene;
 use cyanometer::numerics::significance::{of_chi_square, of_smallest};
@@ -21,6 +21,8 @@ use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::{MemoryFrame, Stage, run};
 use rayon::prelude::*;
+use support::alarms::{corrected, judge, over_seeds, regions_among};
+use support::misses::trials;
 use support::{at, expected, sensor, through};
 
 /// The frame of a uniform scene.
@@ -58,8 +60,7 @@ fn colored(camera: &MemoryFrame, space: Space) -> MemoryFrame {
 }
 
 fn regions(frame: &MemoryFrame, regions: &[Region], equations: Equations) -> Vec<RegionReport> {
-    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-    measure(&mut source, regions, Saturated::Kept, equations, Some(0.5)).unwrap().regions
+    regions_among(&mut Laws::default(), frame, regions, equations)
 }
 
 fn verdict(frame: &MemoryFrame, equations: Equations) -> Verdict {
@@ -67,46 +68,21 @@ fn verdict(frame: &MemoryFrame, equations: Equations) -> Verdict {
     measure(&mut source, &[], Saturated::Kept, equations, Some(1e-4)).unwrap().check.unwrap()
 }
 
-/// The smallest probability of a region, corrected for the number of tests.
-fn corrected(region: &RegionReport) -> f64 {
-    let smallest = region.tests.iter().map(|test| test.p).fold(1.0, f64::min);
-    of_smallest(smallest, region.tests.len())
-}
-
-const LEVELS: [f64; 2] = [0.05, 0.01];
-
-/// Fails when alarms come more often than the level, or more seldom than `share` of it: `n` trials at rate p have
-/// np ± 3.9 √(np(1 − p)) with a chance of 10⁻⁴ to be outside.
-fn judge(what: &str, corrected: &[f64], share: f64) {
-    let n = corrected.len() as f64;
-    for level in LEVELS {
-        let alarms = corrected.iter().filter(|p| **p < level).count() as f64;
-        let bound = 3.9 * (n * level * (1.0 - level)).sqrt();
-        eprintln!("{what}: {alarms} alarms in {n} at level {level}, expected {}", n * level);
-        assert!(alarms <= n * level + bound, "{what}: {alarms} alarms of {n} at {level}");
-        assert!(alarms >= share * n * level - bound, "{what}: only {alarms} alarms of {n} at {level}");
-    }
-}
-
-const SEEDS: u64 = 2000;
-
-fn over_seeds(law: impl Fn(u64) -> Vec<f64> + Sync + Send) -> Vec<Vec<f64>> {
-    let trials: Vec<Vec<f64>> = (0..SEEDS).into_par_iter().map(law).collect();
-    (0..trials[0].len()).map(|i| trials.iter().map(|trial| trial[i]).collect()).collect()
+fn seeds() -> u64 {
+    trials(2000)
 }
 
 /// Whole small frames, every stage of one exposure: electrons, ADU, three demosaickings, XYZ and L*a*b*.
 #[test]
 fn whole_frames_raise_false_alarms_at_the_stated_rate() {
     let scene = scene([24, 18], [3000.0, 9000.0, 20_000.0]);
-    let alarms = over_seeds(|seed| {
+    let alarms = over_seeds(2000, &[], |seed| {
         let electrons = noisy(&scene, seed);
         let codes = digitized(&electrons);
         let plane = through(&codes, &Mosaic::new(&codes.header, None).unwrap());
         let cameras = [Method::Bilinear, Method::EffectiveColor, Method::Malvar].map(|m| demosaicked(&codes, m));
         let [xyz, lab] = [Space::Xyz, Space::Lab].map(|space| colored(&cameras[1], space));
-        let frames = [electrons, codes, plane].into_iter().chain(cameras).chain([xyz, lab]);
-        frames.map(|frame| corrected(&regions(&frame, &[], Equations::Exact)[0])).collect()
+        [electrons, codes, plane].into_iter().chain(cameras).chain([xyz, lab]).collect()
     });
     let names = ["electrons", "ADU", "CFA plane", "BI", "ECI", "MHC", "XYZ", "L*a*b*"];
     for (name, corrected) in names.iter().zip(&alarms) {
@@ -115,7 +91,7 @@ fn whole_frames_raise_false_alarms_at_the_stated_rate() {
     }
 }
 
-/// Patches of one frame, far enough apart to be independent: 5×5 of each size in 80 frames.
+/// Patches of one frame, far enough apart to be independent: 5×5 of each size.
 #[test]
 fn patches_raise_false_alarms_at_the_stated_rate() {
     for [width, height] in [[7, 5], [16, 16]] {
@@ -123,7 +99,7 @@ fn patches_raise_false_alarms_at_the_stated_rate() {
         let scene = scene([5 * pitch, 5 * pitch], [3000.0, 9000.0, 20_000.0]);
         let patches: Vec<Region> =
             (0..25).map(|i| Region { x: i % 5 * pitch + i % 2, y: i / 5 * pitch + i % 3, width, height }).collect();
-        let trials: Vec<f64> = (0..SEEDS / 25)
+        let trials: Vec<f64> = (0..seeds() / 25)
             .into_par_iter()
             .flat_map(|seed| {
                 let camera = demosaicked(&digitized(&noisy(&scene, seed)), Method::EffectiveColor);
@@ -202,8 +178,8 @@ fn wrong_predictions_are_caught() {
     assert!(refused.to_string().contains("nothing can be checked"), "{refused}");
 }
 
-/// The mean of a patch scatters from frame to frame as predicted: 2000 frames, each of another sensor, the patch on one
-/// place. The variance of 2000 means has χ² of 1999 degrees of freedom; the bound leaves 10⁻⁴ to chance for all together.
+/// The mean of a patch scatters from frame to frame as predicted: n frames, each of another sensor, the patch on one place. The
+/// variance of n means has χ² of n − 1 degrees of freedom; the bound leaves 10⁻⁴ to chance for all together.
 #[test]
 fn patch_means_scatter_as_predicted() {
     let scene = scene([26, 24], [3000.0, 9000.0, 20_000.0]);
@@ -228,10 +204,10 @@ fn patch_means_scatter_as_predicted() {
         for stage in 0..2 {
             let reports = regions(&frame(0)[stage], &patches, Equations::Exact);
             let predicted: Vec<f64> = reports.into_iter().flat_map(|region| region.patch_mean_std.unwrap()).collect();
-            let all: Vec<Vec<f64>> = (0..SEEDS).into_par_iter().map(|seed| means(&frame(seed)[stage])).collect();
+            let all: Vec<Vec<f64>> = (0..seeds()).into_par_iter().map(|seed| means(&frame(seed)[stage])).collect();
             let mut smallest = 1.0_f64;
             for (index, predicted) in predicted.iter().enumerate() {
-                let n = SEEDS as f64;
+                let n = seeds() as f64;
                 let mean = all.iter().map(|frame| frame[index]).sum::<f64>() / n;
                 let square: f64 = all.iter().map(|frame| (frame[index] - mean).powi(2)).sum();
                 let p = of_chi_square(square / predicted.powi(2), n - 1.0);

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
 use crate::support;
-use cyanometer::analysis::statistics::{Laws, Region, RegionReport, Saturated, measure, measure_among};
+use cyanometer::analysis::statistics::{Laws, Region, RegionReport, Saturated, measure};
 use cyanometer::camera::linearity::Linearization;
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::camera::taps::{TapLayout, Taps};
@@ -29,7 +29,8 @@ use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::{MemoryFrame, Stage, run};
 use rayon::prelude::*;
-use std::sync::Mutex;
+use support::alarms::{judge, over_seeds, regions_among};
+use support::misses::trials;
 use support::{assert_same, at, crop, expected, sensor, through, through_cuts};
 
 /// Sources that only sensors of this kind have.
@@ -115,13 +116,7 @@ fn colored(camera: &MemoryFrame, space: Space) -> MemoryFrame {
 }
 
 fn regions(frame: &MemoryFrame, regions: &[Region]) -> Vec<RegionReport> {
-    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-    measure(&mut source, regions, Saturated::Kept, Equations::Exact, Some(0.5)).unwrap().regions
-}
-
-fn corrected(region: &RegionReport) -> f64 {
-    let smallest = region.tests.iter().map(|test| test.p).fold(1.0, f64::min);
-    of_smallest(smallest, region.tests.len())
+    regions_among(&mut Laws::default(), frame, regions, Equations::Exact)
 }
 
 // --- what is drawn ---------------------------------------------------------------------------------------------------
@@ -231,41 +226,24 @@ fn sensors_without_them_say_nothing_of_them() {
 
 // --- what is predicted -----------------------------------------------------------------------------------------------
 
-const SEEDS: u64 = 400;
-
-/// Fails when alarms come more often than the level, or more seldom than `share` of it; bounds as in tests/checks.rs, 3.9 standard
-/// deviations.
-fn judge(what: &str, corrected: &[f64], share: f64) {
-    let n = corrected.len() as f64;
-    for level in [0.05, 0.01] {
-        let alarms = corrected.iter().filter(|p| **p < level).count() as f64;
-        let bound = 3.9 * (n * level * (1.0 - level)).sqrt();
-        eprintln!("{what}: {alarms} alarms in {n} at level {level}, expected {}", n * level);
-        assert!(alarms <= n * level + bound, "{what}: {alarms} alarms of {n} at {level}");
-        assert!(alarms >= share * n * level - bound, "{what}: only {alarms} alarms of {n} at {level}");
-    }
-}
+/// Seeds of which a third is tried, or all.
+const SEEDS: u64 = 900;
 
 fn coverage(scene: &MemoryFrame, what: &str, share: f64) {
     let names =
         ["electrons", "ADU", "CFA plane", "less 3 darks", "BI", "SHTI", "ECI", "MHC", "darks, ECI", "XYZ", "L*a*b*"];
-    let trials: Vec<Vec<f64>> = (0..SEEDS)
-        .into_par_iter()
-        .map(|seed| {
-            let electrons = noisy(scene, &settings(seed));
-            let codes = digitized(&electrons);
-            let plane = plane_of(&codes);
-            let less = less_darks(&plane, scene, seed, 3);
-            let cameras = [Method::Bilinear, Method::SmoothHue, Method::EffectiveColor, Method::Malvar]
-                .map(|method| demosaicked(&plane, method));
-            let of_less = demosaicked(&less, Method::EffectiveColor);
-            let [xyz, lab] = [Space::Xyz, Space::Lab].map(|space| colored(&cameras[2], space));
-            let frames = [electrons, codes, plane, less].into_iter().chain(cameras).chain([of_less, xyz, lab]);
-            frames.map(|frame| corrected(&regions(&frame, &[])[0])).collect()
-        })
-        .collect();
-    for (index, name) in names.iter().enumerate() {
-        let corrected: Vec<f64> = trials.iter().map(|trial| trial[index]).collect();
+    let made = |seed: u64| {
+        let electrons = noisy(scene, &settings(seed));
+        let codes = digitized(&electrons);
+        let plane = plane_of(&codes);
+        let less = less_darks(&plane, scene, seed, 3);
+        let cameras = [Method::Bilinear, Method::SmoothHue, Method::EffectiveColor, Method::Malvar]
+            .map(|method| demosaicked(&plane, method));
+        let of_less = demosaicked(&less, Method::EffectiveColor);
+        let [xyz, lab] = [Space::Xyz, Space::Lab].map(|space| colored(&cameras[2], space));
+        [electrons, codes, plane, less].into_iter().chain(cameras).chain([of_less, xyz, lab]).collect()
+    };
+    for (name, corrected) in names.iter().zip(over_seeds(SEEDS, &[], made)) {
         judge(&format!("{what}, {name}"), &corrected, share);
     }
 }
@@ -293,8 +271,8 @@ fn frames_raise_false_alarms_at_the_stated_rate() {
     coverage(&scene([25, 17], [9000.0, 14_000.0, 11_000.0]), "bright", 0.6);
 }
 
-/// The mean of a patch scatters from frame to frame as predicted, and pixels as `--sigma` says: 2000 frames, each of another
-/// sensor. Variances of 2000 have χ² of 1999 degrees of freedom.
+/// The mean of a patch scatters from frame to frame as predicted, and pixels as `--sigma` says: n frames, each of another
+/// sensor. Variances of n have χ² of n − 1 degrees of freedom.
 #[test]
 fn patch_means_scatter_as_predicted() {
     let scene = scene([26, 24], [900.0, 2500.0, 1800.0]);
@@ -322,7 +300,7 @@ fn patch_means_scatter_as_predicted() {
         made.push(colored(&made[4], Space::Xyz));
         made
     };
-    let seeds: u64 = 2000;
+    let seeds = trials(2000);
     let all: Vec<Vec<Vec<f64>>> =
         (0..seeds).into_par_iter().map(|seed| frames(seed).iter().map(of).collect()).collect();
     let mut smallest = 1.0_f64;
@@ -514,13 +492,9 @@ fn taps_and_drift_belong_to_places() {
 }
 
 /// False alarms of the regions of frames come no more often than the level says.
-fn regions_cover(what: &str, parts: &[Region], made: impl Fn(u64) -> Vec<MemoryFrame> + Sync) {
-    let of = |seed: u64| -> Vec<f64> {
-        made(seed).iter().flat_map(|frame| regions(frame, parts)).map(|region| corrected(&region)).collect()
-    };
-    let trials: Vec<Vec<f64>> = (0..SEEDS).into_par_iter().map(of).collect();
-    for index in 0..trials[0].len() {
-        judge(&format!("{what}, {index}"), &trials.iter().map(|trial| trial[index]).collect::<Vec<_>>(), 0.0);
+fn regions_cover(what: &str, parts: &[Region], made: impl Fn(u64) -> Vec<MemoryFrame> + Sync + Send) {
+    for (index, corrected) in over_seeds(SEEDS, parts, made).iter().enumerate() {
+        judge(&format!("{what}, {index}"), corrected, 0.0);
     }
 }
 
@@ -570,43 +544,24 @@ fn pixels_of_several_taps_raise_false_alarms_at_the_stated_rate() {
         Method::Bilinear,
     ]) {
         let scene = tapped([22, 18], [900.0, 2500.0, 1800.0], taps);
-        let laws = Mutex::new(Vec::new());
-        let parts = [whole, some];
-        let of = |seed: u64| -> Vec<f64> {
+        let made = |seed: u64| {
             let plane = plane_of(&digitized(&noisy(&scene, &settings(seed))));
             let camera = demosaicked(&plane, method);
-            let frames = [
-                demosaicked(&less_darks(&plane, &scene, seed, 2), method),
-                colored(&camera, Space::Xyz),
-                colored(&camera, Space::Lab),
-                camera,
-            ];
-            // Laws hang on no seed; each thread keeps its own.
-            let mut known: [Laws; 4] = laws.lock().unwrap().pop().unwrap_or_default();
-            let found = frames.iter().zip(&mut known).flat_map(|(frame, laws)| {
-                let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-                let exact = Equations::Exact;
-                let report = measure_among(laws, &mut source, &parts, Saturated::Kept, exact, Some(0.5)).unwrap();
-                report.regions.iter().map(corrected).collect::<Vec<_>>()
-            });
-            let found = found.collect();
-            laws.lock().unwrap().push(known);
-            found
+            let less = demosaicked(&less_darks(&plane, &scene, seed, 2), method);
+            vec![less, colored(&camera, Space::Xyz), colored(&camera, Space::Lab), camera]
         };
-        let trials: Vec<Vec<f64>> = (0..SEEDS).into_par_iter().map(of).collect();
-        for index in 0..trials[0].len() {
-            let of_index: Vec<f64> = trials.iter().map(|trial| trial[index]).collect();
-            judge(&format!("{:?}, {method:?}, {index}", taps.layout), &of_index, 0.4);
+        for (index, corrected) in over_seeds(SEEDS, &[whole, some], made).iter().enumerate() {
+            judge(&format!("{:?}, {method:?}, {index}", taps.layout), corrected, 0.4);
         }
     }
 }
 
-/// Means of pixels of several taps lie about the predicted ones with the predicted scatter over 1500 sensors, and sample variances and
-/// covariances too: sums of squares of 1500 have chi-square of as many degrees of freedom, and means of that many z lie within 5
-/// standard errors.
+/// Means of pixels of several taps lie about the predicted ones with the predicted scatter over n sensors, and sample variances and
+/// covariances too: sums of squares of n have chi-square of as many degrees of freedom, and means of that many z lie within 5 standard
+/// errors.
 #[test]
 fn pixels_of_several_taps_scatter_as_predicted() {
-    let seeds = 1500_u64;
+    let seeds = trials(1500);
     let mut smallest = 1.0_f64;
     let mut tests = 0;
     for (taps, method) in several_taps().iter().zip([
@@ -680,7 +635,7 @@ fn drifting_frames_raise_false_alarms_at_the_stated_rate() {
 /// sample variances the predicted mean.
 #[test]
 fn regions_of_taps_and_drift_scatter_as_predicted() {
-    let seeds = 1500_u64;
+    let seeds = trials(1500);
     let scenes = [
         tapped([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[4]),
         tapped([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[1]),

@@ -643,7 +643,11 @@ fn the_sidecar_tells_what_was_done_and_what_came_of_it() {
             _ => assert_eq!((record.full_well, record.clipped_high), (None, None), "{name}"),
         }
         assert_eq!(record.not_finite, None);
-        // What the file itself carries is the same, but for what only the last row could tell.
+        // What the file itself carries is the same, but for what only the last row could tell; readers take the seal off.
+        assert_eq!(
+            sidecar.seal.take().unwrap().size,
+            [shop.frame(name).header.geometry.width, shop.frame(name).header.geometry.height]
+        );
         fs::rename(shop.path(&format!("{name}.yaml")), shop.path("aside.yaml")).unwrap();
         assert_eq!(shop.read(name).1, sidecar, "{name}");
         fs::rename(shop.path("aside.yaml"), shop.path(&format!("{name}.yaml"))).unwrap();

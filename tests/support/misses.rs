@@ -1,4 +1,9 @@
-//! How often intervals miss the numbers that they are to hold.
+//! How often intervals miss the numbers that they are to hold, and how many trials are made.
+
+/// How many trials a law gets: a third of all, or all where CYANOMETER_CAMERAS asks for more of everything that is drawn at random.
+pub fn trials(all: u64) -> u64 {
+    if std::env::var_os("CYANOMETER_CAMERAS").is_some() { all } else { all / 3 }
+}
 
 /// The probability that an interval holds its number.
 pub const CONFIDENCE: f64 = 0.95;

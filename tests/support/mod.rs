@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
 pub mod advised;
+pub mod alarms;
 pub mod bounds;
 pub mod dng;
 pub mod fits;

@@ -12,7 +12,10 @@ const MOST_NAMED: usize = 3;
 /// What it says besides is no contradiction.
 pub(super) fn changed_since(sidecar: &Metadata, reader: &dyn SampleReader) -> Vec<String> {
     let own = reader.embedded().and_then(|text| yaml::parse_metadata("", text).ok());
-    let Some(own) = own.filter(|own| !own.history.is_empty()) else { return Vec::new() };
+    // A sidecar with another history is that of another frame, as its digest tells.
+    let Some(own) = own.filter(|own| !own.history.is_empty() && own.history == sidecar.history) else {
+        return Vec::new();
+    };
     let [told, written] = [sidecar, &own].map(|metadata| serde_yaml::to_value(lasting(metadata)).ok());
     let mut found = Vec::new();
     told.zip(written).inspect(|(told, written)| compare("", told, written, &mut found));

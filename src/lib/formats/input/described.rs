@@ -5,6 +5,18 @@ use crate::formats::register;
 use crate::frame::Geometry;
 use crate::metadata::{SamplesRecord, Seal};
 
+/// What the samples of a frame are held against, by who tells their digest and by what stands ahead of them, and what is wrong already.
+pub(super) fn begin(
+    of_all: Option<(&SamplesRecord, &str)>,
+    seal: Option<&Seal>,
+    stored: &Geometry,
+    name: &str,
+) -> (Option<DigestCheck>, Option<String>) {
+    let wrong = seal.and_then(|seal| other_size(seal, stored, name));
+    let check = of_all.map(|(samples, by)| DigestCheck::of_all(samples, by, stored));
+    (check.or_else(|| seal.map(DigestCheck::of_first_row)).filter(|_| wrong.is_none()), wrong)
+}
+
 /// A digest to compare with once the rows are in that it is of.
 pub(super) struct DigestCheck {
     expected: String,
@@ -19,7 +31,7 @@ pub(super) struct DigestCheck {
 
 impl DigestCheck {
     /// Of all rows, by the sidecar or another place that tells their digest.
-    pub(super) fn of_all(samples: &SamplesRecord, by: &str, stored: &Geometry) -> Self {
+    fn of_all(samples: &SamplesRecord, by: &str, stored: &Geometry) -> Self {
         let problem = format!("its samples are not those that {by} describes; one of the two was changed");
         Self::of(&samples.digest, problem, true, stored.height)
     }
@@ -30,7 +42,7 @@ impl DigestCheck {
     }
 
     /// Of the first row alone, by what metadata tell that stand ahead of the samples.
-    pub(super) fn of_first_row(seal: &Seal) -> Self {
+    fn of_first_row(seal: &Seal) -> Self {
         let problem = "its samples are not those that its metadata were written with: another program changed them, and what the \
                        metadata tell of levels, place and noise need not hold any more"
             .to_owned();
@@ -57,7 +69,7 @@ impl DigestCheck {
 }
 
 /// A warning of a frame of another size than its metadata were written for; none of the right size.
-pub(super) fn other_size(seal: &Seal, stored: &Geometry, name: &str) -> Option<String> {
+fn other_size(seal: &Seal, stored: &Geometry, name: &str) -> Option<String> {
     let Geometry { width, height, .. } = stored;
     let [had_width, had_height] = seal.size;
     if seal.size == [*width, *height] {

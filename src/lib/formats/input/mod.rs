@@ -18,9 +18,9 @@ pub use options::{InputOptions, Linearizing, OfCamera};
 pub(crate) use time::TOO_DARK;
 
 use self::checks::Checks;
-use self::described::{DigestCheck, other_size};
+use self::described::DigestCheck;
 use self::kept::{LEFT_OUT, Taken, count_marks, cut, left_out};
-use self::metadata::{Found, FoundIn, doubt_of_marks, find_metadata, placed, take_scaling};
+use self::metadata::{Found, doubt_of_marks, find_metadata, placed, take_scaling};
 use self::opening::{head_of, is_file, of_upstream, open_piped, open_seekable, open_unseekable, readers_of};
 use super::dng::{DngReader, RawArea};
 use super::files::{named, open_named, spool};
@@ -210,12 +210,10 @@ impl FrameReader {
         let kept = first_channel..first_channel + geometry.channels.len();
         let mask = stored.channels.iter().position(|of| of == MASK_LAYER).filter(|at| is_ours && !kept.contains(at));
         notes.extend(kept::left_out(name, left_out));
-        let seal = metadata.seal.take().filter(|_| !matches!(place, FoundIn::Given(_)));
-        let mismatch = seal.as_ref().and_then(|seal| other_size(seal, stored, name));
+        let seal = metadata.seal.take();
         // A digest is one of all samples.
-        let described = metadata.samples.as_ref().zip(sidecar).filter(|_| options.crop.is_none());
-        let whole = described.map(|(samples, by)| DigestCheck::of_all(samples, &by, stored));
-        let check = whole.or_else(|| seal.as_ref().map(DigestCheck::of_first_row)).filter(|_| mismatch.is_none());
+        let of_all = metadata.samples.as_ref().zip(sidecar.as_deref()).filter(|_| options.crop.is_none());
+        let (check, mismatch) = described::begin(of_all, seal.as_ref(), stored, name);
         let is_unsigned = reader.stored_as().is_some_and(SampleType::is_unsigned);
         let divisor = (metadata.quantity == QuantityKind::Srgb && is_unsigned).then_some(U16_FULL_SCALE);
         if let Some(file) = &metadata.file {

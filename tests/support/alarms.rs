@@ -1,0 +1,60 @@
+//! How often checks call honest frames wrong.
+
+use crate::support::misses::trials;
+use cyanometer::analysis::statistics::{Laws, Region, RegionReport, Saturated, measure_among};
+use cyanometer::numerics::significance::of_smallest;
+use cyanometer::propagation::Equations;
+use cyanometer::stream::MemoryFrame;
+use rayon::prelude::*;
+use std::sync::Mutex;
+
+/// What is said of regions of a frame, the whole frame where there are none, whose laws are kept.
+pub fn regions_among(
+    laws: &mut Laws,
+    frame: &MemoryFrame,
+    parts: &[Region],
+    equations: Equations,
+) -> Vec<RegionReport> {
+    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+    measure_among(laws, &mut source, parts, Saturated::Kept, equations, Some(0.5)).unwrap().regions
+}
+
+/// The smallest probability of a region, corrected for the number of tests.
+pub fn corrected(region: &RegionReport) -> f64 {
+    let smallest = region.tests.iter().map(|test| test.p).fold(1.0, f64::min);
+    of_smallest(smallest, region.tests.len())
+}
+
+/// The corrected probabilities of so many seeds, for each part of each of the frames that are made of one. Laws hang on no seed, nor on
+/// which of like sensors it is: each thread keeps its own.
+pub fn over_seeds(most: u64, parts: &[Region], made: impl Fn(u64) -> Vec<MemoryFrame> + Sync + Send) -> Vec<Vec<f64>> {
+    let laws: Mutex<Vec<Vec<Laws>>> = Mutex::default();
+    let of = |seed: u64| -> Vec<f64> {
+        let mut frames = made(seed);
+        for noise in frames.iter_mut().filter_map(|frame| frame.header.metadata.noise.as_mut()) {
+            noise.sensor_seed = 0;
+        }
+        let mut known = laws.lock().unwrap().pop().unwrap_or_default();
+        known.resize_with(frames.len(), Laws::default);
+        let reports =
+            frames.iter().zip(&mut known).flat_map(|(frame, laws)| regions_among(laws, frame, parts, Equations::Exact));
+        let found = reports.map(|region| corrected(&region)).collect();
+        laws.lock().unwrap().push(known);
+        found
+    };
+    let all: Vec<Vec<f64>> = (0..trials(most)).into_par_iter().map(of).collect();
+    (0..all[0].len()).map(|i| all.iter().map(|trial| trial[i]).collect()).collect()
+}
+
+/// Fails when alarms come more often than the level, or more seldom than `share` of it: `n` trials at rate p have
+/// np ± 3.9 √(np(1 − p)) with a chance of 10⁻⁴ to be outside.
+pub fn judge(what: &str, corrected: &[f64], share: f64) {
+    let n = corrected.len() as f64;
+    for level in [0.05, 0.01] {
+        let alarms = corrected.iter().filter(|p| **p < level).count() as f64;
+        let bound = 3.9 * (n * level * (1.0 - level)).sqrt();
+        eprintln!("{what}: {alarms} alarms in {n} at level {level}, expected {}", n * level);
+        assert!(alarms <= n * level + bound, "{what}: {alarms} alarms of {n} at {level}");
+        assert!(alarms >= share * n * level - bound, "{what}: only {alarms} alarms of {n} at {level}");
+    }
+}
