@@ -77,7 +77,7 @@ enum Encoder {
 }
 
 impl FrameWriter {
-    /// Opens the output and its sidecar, and writes the head of the frame.
+    /// Opens the output and its sidecar. The head of the frame is written with its first row.
     ///
     /// # Errors
     ///
