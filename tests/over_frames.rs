@@ -30,6 +30,8 @@ use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::{MemoryFrame, Stage};
 use cyanometer::units::QuantityKind;
 use rayon::prelude::*;
+use support::alarms::judge;
+use support::misses;
 use support::{sensor, through};
 
 /// Even numbers.
@@ -192,7 +194,7 @@ type Deviates = Vec<(String, f64)>;
 /// CYANOMETER_CAMERAS sets how many.
 #[test]
 fn statistics_over_frames_are_as_predicted() {
-    let cameras: u64 = std::env::var("CYANOMETER_CAMERAS").ok().and_then(|count| count.parse().ok()).unwrap_or(24);
+    let cameras: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(24, |count| count.parse().unwrap());
     let trials: Vec<(u64, Vec<Deviates>)> = (0..cameras)
         .into_par_iter()
         .map(|seed| {
@@ -247,9 +249,8 @@ fn statistics_over_frames_are_as_predicted() {
 /// Checks raise false alarms no more often than the level.
 #[test]
 fn false_alarms_are_no_more_than_the_level() {
-    let factor: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(1, |_| 4);
     for (what, size, frames) in [("small", [16, 12], 3), ("many", [24, 20], 30), ("two", [70, 60], 2)] {
-        let seeds = factor * 60;
+        let seeds = misses::trials(120);
         let trials: Vec<Vec<Option<f64>>> = (0..seeds)
             .into_par_iter()
             .map(|seed| {
@@ -262,15 +263,7 @@ fn false_alarms_are_no_more_than_the_level() {
             .collect();
         for (stage, name) in STAGES.iter().enumerate() {
             let told: Vec<f64> = trials.iter().filter_map(|trial| trial[stage]).collect();
-            for level in [0.05, 0.01] {
-                let alarms = told.iter().filter(|p| **p < level).count() as f64;
-                let n = told.len() as f64;
-                eprintln!("{what}, {name}: {alarms} alarms in {n} at level {level}");
-                assert!(
-                    alarms <= n * level + 3.9 * (n * level * (1.0 - level)).sqrt() + 1.0,
-                    "{what}, {name}: {alarms} of {n}"
-                );
-            }
+            judge(&format!("{what}, {name}"), &told, 0.0);
         }
     }
 }
@@ -524,25 +517,18 @@ impl Honest {
 }
 
 /// Samples that are far from normal raise no more alarms than the level, each test has a law that is known, its deviates have rms 1,
-/// and T is on average what stands beside it. CYANOMETER_CAMERAS makes it 400 seeds.
+/// and T is on average what stands beside it.
 #[test]
 fn honest_frames_far_from_normal_pass() {
-    let seeds: u64 = if std::env::var("CYANOMETER_CAMERAS").is_ok() { 400 } else { 60 };
+    let seeds = misses::trials(100);
     let mut failures = Vec::new();
     for case in &HONEST {
         let trials: Vec<_> = (0..seeds).into_par_iter().map(|seed| case.tests(20_000 + seed)).collect();
         let name = case.name;
         let n = trials.len() as f64;
-        for level in [0.05, 0.01, 1e-4] {
-            let is_alarm = |tests: &Vec<(String, f64, f64)>| {
-                of_smallest(tests.iter().map(|(_, _, p)| *p).fold(1.0, f64::min), tests.len()) < level
-            };
-            let alarms = trials.iter().filter(|(tests, _)| is_alarm(tests)).count() as f64;
-            eprintln!("{name}: {alarms} alarms in {n} at level {level}");
-            if alarms > n * level + 3.9 * (n * level * (1.0 - level)).sqrt() + 1.0 {
-                failures.push(format!("{name}: {alarms} alarms of {n} at level {level}"));
-            }
-        }
+        let smallest =
+            trials.iter().map(|(tests, _)| (tests.iter().map(|(_, _, p)| *p).fold(1.0, f64::min), tests.len()));
+        judge(name, &smallest.map(|(p, tests)| of_smallest(p, tests)).collect::<Vec<f64>>(), 0.0);
         for subject in ["Mean", "Variance", "VarianceOfMeans", "TemporalVariance"] {
             let of_subject = trials.iter().flat_map(|(tests, _)| tests).filter(|(of, _, _)| of == subject);
             let deviates: Vec<f64> = of_subject.map(|(_, z, _)| *z).collect();

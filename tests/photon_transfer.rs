@@ -15,7 +15,7 @@ use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::MemoryFrame;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use support::misses::{CONFIDENCE, allowed_misses, check_misses};
+use support::misses::{CONFIDENCE, allowed_misses, check_misses, trials};
 use support::photon_transfer::{
     Chance, FLAT_S, Kind, QUANTUM_EFFICIENCY, SIZE, Shake, WARM_K, camera, found, level, levels, levels_of, measured,
     settings, truths,
@@ -605,7 +605,7 @@ fn an_error_of_all_photons_does_not_average_out() {
 #[test]
 fn full_well_counts_the_dark_charge() {
     const COUNT: u32 = 20;
-    let missed = (0..COUNT).filter(|&index| {
+    let missed = (0..COUNT).into_par_iter().filter(|&index| {
         let full_well_e = 12_000.0;
         let readout = ReadOut {
             full_well_e,
@@ -648,14 +648,13 @@ fn full_well_counts_the_dark_charge() {
 }
 
 /// Cameras whose noise is 0.1 to 0.5 of a code: what means and variances of darks tell holds what rounding hides, wherever black lies
-/// between two codes, and neither a black level that moves nor a response that bends is told of. Of 40 so many may lie outside by chance: 4 standard deviations
-/// beyond 5 %.
+/// between two codes, and neither a black level that moves nor a response that bends is told of.
 #[test]
 fn what_rounding_hides_of_quiet_darks_is_within_intervals() {
     const KEYS: [&str; 5] =
         ["black_level_adu", "dark_current_e_per_s", "gain_adu_per_e", "dark_noise_e", "quantum_efficiency"];
     for noise_adu in [0.1, 0.2, 0.3, 0.4, 0.5] {
-        let found: Vec<[Option<bool>; 5]> = (0..40_u32)
+        let found: Vec<[Option<bool>; 5]> = (0..u32::try_from(trials(60)).unwrap())
             .into_par_iter()
             .map(|index| {
                 let mut chance = Chance { camera: 5000 + index, drawn: 0 };

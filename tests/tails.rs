@@ -8,7 +8,6 @@ use cyanometer::camera::readout::ReadOut;
 use cyanometer::cfa::CfaPattern;
 use cyanometer::color::{Space, White};
 use cyanometer::metadata::{PoissonKind, Scene};
-use cyanometer::numerics::significance::of_smallest;
 use cyanometer::numerics::vectors::Instructions;
 use cyanometer::propagation::{Equations, of_frame};
 use cyanometer::random::Source;
@@ -23,6 +22,7 @@ use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::{MemoryFrame, Stage, run};
 use rayon::prelude::*;
+use support::alarms::{corrected, judge, over_seeds};
 use support::{assert_same, at, crop, expected, sensor, through, through_cuts};
 
 /// A CMOS sensor with tails of both kinds.
@@ -112,11 +112,6 @@ fn report(frame: &MemoryFrame) -> RegionReport {
     let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
     let none: [Region; 0] = [];
     measure(&mut source, &none, Saturated::Kept, Equations::Exact, Some(0.5)).unwrap().regions.remove(0)
-}
-
-fn corrected(region: &RegionReport) -> f64 {
-    let smallest = region.tests.iter().map(|test| test.p).fold(1.0, f64::min);
-    of_smallest(smallest, region.tests.len())
 }
 
 // --- what is drawn ---------------------------------------------------------------------------------------------------
@@ -340,10 +335,10 @@ fn random_sensor(random: &mut Random) -> impl Fn(&mut ReadOut) + use<> {
 type Trial = (u64, Vec<Vec<(String, f64)>>);
 
 /// Random sensors, each one frame at every stage: deviates of means and variances have rms 1 within 4 standard errors, and none is
-/// above 5. CYANOMETER_TAILS sets how many sensors.
+/// above 5. CYANOMETER_CAMERAS sets how many sensors.
 #[test]
 fn moments_are_as_predicted_at_every_stage() {
-    let sensors: u64 = std::env::var("CYANOMETER_TAILS").ok().and_then(|count| count.parse().ok()).unwrap_or(16);
+    let sensors: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(16, |count| count.parse().unwrap());
     let trials: Vec<Trial> = (0..sensors)
         .into_par_iter()
         .map(|seed| {
@@ -428,23 +423,10 @@ fn false_alarms_are_no_more_than_the_level() {
         ("rare", scene([60, 50], [300.0, 500.0, 400.0], rare)),
         ("large", scene([300, 200], [300.0, 500.0, 400.0], tailed)),
     ];
-    let factor: u64 = std::env::var("CYANOMETER_TAILS").map_or(1, |_| 4);
     for (what, scene) in cases {
-        let seeds: u64 = factor * if what == "large" { 100 } else { 300 };
-        let trials: Vec<Vec<f64>> = (0..seeds)
-            .into_par_iter()
-            .map(|seed| chain(&scene, 40_000 + seed).iter().map(|frame| corrected(&report(frame))).collect())
-            .collect();
-        for (stage, name) in STAGES.iter().enumerate() {
-            for level in [0.05, 0.01] {
-                let alarms = trials.iter().filter(|trial| trial[stage] < level).count() as f64;
-                let n = seeds as f64;
-                eprintln!("{what}, {name}: {alarms} alarms in {n} at level {level}");
-                assert!(
-                    alarms <= n * level + 3.9 * (n * level * (1.0 - level)).sqrt() + 1.0,
-                    "{what}, {name}: {alarms}"
-                );
-            }
+        let trials = over_seeds(if what == "large" { 300 } else { 900 }, &[], |seed| chain(&scene, 40_000 + seed));
+        for (name, corrected) in STAGES.iter().zip(&trials) {
+            judge(&format!("{what}, {name}"), corrected, 0.0);
         }
     }
 }

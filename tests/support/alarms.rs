@@ -6,6 +6,7 @@ use cyanometer::numerics::significance::of_smallest;
 use cyanometer::propagation::Equations;
 use cyanometer::stream::MemoryFrame;
 use rayon::prelude::*;
+use statrs::distribution::{Binomial, DiscreteCDF};
 use std::sync::Mutex;
 
 /// What is said of regions of a frame, the whole frame where there are none, whose laws are kept.
@@ -46,15 +47,16 @@ pub fn over_seeds(most: u64, parts: &[Region], made: impl Fn(u64) -> Vec<MemoryF
     (0..all[0].len()).map(|i| all.iter().map(|trial| trial[i]).collect()).collect()
 }
 
-/// Fails when alarms come more often than the level, or more seldom than `share` of it: `n` trials at rate p have
-/// np ± 3.9 √(np(1 − p)) with a chance of 10⁻⁴ to be outside.
+/// Fails when alarms come more often than the level, or more seldom than `share` of it: when so many, or so few, are as improbable as
+/// one in 10⁴ by the binomial law.
 pub fn judge(what: &str, corrected: &[f64], share: f64) {
-    let n = corrected.len() as f64;
-    for level in [0.05, 0.01] {
-        let alarms = corrected.iter().filter(|p| **p < level).count() as f64;
-        let bound = 3.9 * (n * level * (1.0 - level)).sqrt();
-        eprintln!("{what}: {alarms} alarms in {n} at level {level}, expected {}", n * level);
-        assert!(alarms <= n * level + bound, "{what}: {alarms} alarms of {n} at {level}");
-        assert!(alarms >= share * n * level - bound, "{what}: only {alarms} alarms of {n} at {level}");
+    let n = corrected.len() as u64;
+    for level in [0.05, 0.01, 1e-4] {
+        let alarms = corrected.iter().filter(|p| **p < level).count() as u64;
+        eprintln!("{what}, level {level}: {alarms} alarms of {n}");
+        let at_least = 1.0 - alarms.checked_sub(1).map_or(0.0, |fewer| Binomial::new(level, n).unwrap().cdf(fewer));
+        assert!(at_least > 1e-4, "{what}: {alarms} alarms of {n} at {level}");
+        let at_most = Binomial::new(share * level, n).unwrap().cdf(alarms);
+        assert!(at_most > 1e-4, "{what}: only {alarms} alarms of {n} at {level}");
     }
 }

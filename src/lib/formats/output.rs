@@ -68,8 +68,10 @@ pub struct FrameWriter {
 }
 
 enum Encoder {
-    /// Nothing is written before the first row is there, whose digest stands ahead of it; none while the head is written.
-    Waiting(Option<Target>),
+    /// Nothing is written before the first row is there, whose digest stands ahead of it.
+    Waiting(Target),
+    /// The head could not be written.
+    GivenUp,
     Exr(Box<ExrWriter<Target>>),
     Tiff(Box<TiffWriter<Target>>),
     Dng(Box<DngWriter<Target>>),
@@ -106,14 +108,19 @@ impl FrameWriter {
         yaml::write_metadata(&header.metadata)?;
         let scaling = Scaling::of(header.geometry.width, &header.geometry.channels, sample_scale);
         let (scaled, stored) = (Vec::new(), Vec::new());
-        let (encoder, layers) = (Encoder::Waiting(Some(target)), options.layers()?);
+        let (encoder, layers) = (Encoder::Waiting(target), options.layers()?);
         Ok(Self { encoder, header, name, record, encoding, layers, scaling, scaled, stored })
     }
 
     /// Writes the head of the frame, which tells of the samples to store what a reader can hold them against.
     fn begin(&mut self, samples: &[f32], to_store: &[f32]) -> Result<()> {
-        let Encoder::Waiting(target) = &mut self.encoder else { return Ok(()) };
-        let Some(target) = target.take() else { return Err(Error::Data(format!("{}: it was given up", self.name))) };
+        let target = match std::mem::replace(&mut self.encoder, Encoder::GivenUp) {
+            Encoder::Waiting(target) => target,
+            begun => {
+                self.encoder = begun;
+                return Ok(());
+            }
+        };
         let Geometry { width, height, .. } = self.header.geometry;
         let row = self.header.geometry.row_samples().min(samples.len());
         let (mut digest, mut stored) = (SamplesDigest::new(), Vec::new());
@@ -172,7 +179,7 @@ impl FrameWriter {
         self.begin(&[], &[])?;
         let mut did_not_fit = 0;
         let mut target = match self.encoder {
-            Encoder::Waiting(_) => return Err(Error::Data(format!("{}: it was given up", self.name))),
+            Encoder::Waiting(_) | Encoder::GivenUp => return Err(given_up(&self.name)),
             Encoder::Exr(writer) => {
                 let (mut target, patch) = writer.finish()?;
                 if let Some(patch) = patch {
@@ -209,6 +216,10 @@ impl FrameWriter {
         target.commit_with(sidecar)?;
         Ok(did_not_fit)
     }
+}
+
+fn given_up(name: &str) -> Error {
+    Error::Data(format!("{name}: its head could not be written"))
 }
 
 /// What EXR attributes tell other software of a frame.
@@ -395,8 +406,7 @@ impl FrameWriter {
 impl FrameWriter {
     fn encode(&mut self, samples: &[f32]) -> Result<()> {
         match &mut self.encoder {
-            // The head is written before.
-            Encoder::Waiting(_) => Ok(()),
+            Encoder::Waiting(_) | Encoder::GivenUp => Err(given_up(&self.name)),
             Encoder::Exr(writer) => writer.write(samples),
             Encoder::Tiff(writer) => writer.write_rows(samples),
             Encoder::Dng(writer) => writer.write_rows(samples),

@@ -5,7 +5,7 @@ use super::output::OutputOptions;
 use super::places::{named, sidecar_path};
 use super::yaml::{parse_metadata, write_metadata};
 use crate::error::Result;
-use crate::metadata::{FrameHeader, Metadata};
+use crate::metadata::FrameHeader;
 use std::fs::File;
 
 /// Whether the frame `made` lies at a place already, whole: its sidecar says of it what this run would, and describes the samples
@@ -25,7 +25,7 @@ pub fn is_complete(options: &OutputOptions, made: &FrameHeader) -> Result<bool> 
         return Ok(false);
     };
     let digest = found.samples.as_ref().map(|samples| samples.digest.clone());
-    if write_metadata(&lasting(found))? != write_metadata(&lasting(made.metadata.clone()))? {
+    if write_metadata(&found.apart_from_storage())? != write_metadata(&made.metadata.clone().apart_from_storage())? {
         return Ok(false);
     }
     let stored = options.sample_type(made)?;
@@ -33,9 +33,4 @@ pub fn is_complete(options: &OutputOptions, made: &FrameHeader) -> Result<bool> 
         FrameReader::holds(File::open(path).ok()?, &path.display().to_string(), made, (&digest, stored)).ok()
     };
     Ok(digest.and_then(holds).unwrap_or(false))
-}
-
-/// What of the metadata is known before the samples are, and does not hang on how they are stored.
-fn lasting(metadata: Metadata) -> Metadata {
-    Metadata { seal: None, samples: None, sample_scale: None, file: None, ..metadata }
 }

@@ -237,6 +237,12 @@ impl Metadata {
         }
     }
 
+    /// What a file of the frame and its sidecar share: all that is known before the samples are, and does not hang on where and how
+    /// they are stored.
+    pub(crate) fn apart_from_storage(self) -> Self {
+        Self { seal: None, samples: None, sample_scale: None, file: None, frames_to_come: None, ..self }
+    }
+
     /// The same record about samples of another quantity: what held for the old samples alone is dropped.
     pub fn becoming(&self, quantity: QuantityKind) -> Self {
         Self {

@@ -16,7 +16,8 @@ pub(super) fn changed_since(sidecar: &Metadata, reader: &dyn SampleReader) -> Ve
     let Some(own) = own.filter(|own| !own.history.is_empty() && own.history == sidecar.history) else {
         return Vec::new();
     };
-    let [told, written] = [sidecar, &own].map(|metadata| serde_yaml::to_value(lasting(metadata)).ok());
+    let [told, written] =
+        [sidecar.clone(), own].map(|metadata| serde_yaml::to_value(metadata.apart_from_storage()).ok());
     let mut found = Vec::new();
     told.zip(written).inspect(|(told, written)| compare("", told, written, &mut found));
     let left = found.len().saturating_sub(MOST_NAMED);
@@ -25,12 +26,6 @@ pub(super) fn changed_since(sidecar: &Metadata, reader: &dyn SampleReader) -> Ve
         found.push(format!("{left} more of its keys say another thing than the file of the frame; the sidecar counts"));
     }
     found
-}
-
-/// What a sidecar shares with the metadata in the file.
-fn lasting(metadata: &Metadata) -> Metadata {
-    let metadata = metadata.clone();
-    Metadata { samples: None, seal: None, file: None, frames_to_come: None, sample_scale: None, ..metadata }
 }
 
 /// Looks for values of the key `path` that differ, or are gone.
