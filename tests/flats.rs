@@ -6,7 +6,7 @@ use crate::support;
 use cyanometer::formats::input::{FrameReader, InputOptions};
 use cyanometer::stream::RowSource;
 use std::fs;
-use support::fits::{chance, write_fits};
+use support::fits::{chance, write_fits, write_sensor};
 use support::workshop::Workshop;
 
 const SIZE: [u32; 2] = [161, 121];
@@ -93,6 +93,48 @@ fn saturated_and_defective_places_tilt_no_class() {
     write_fits(&shop, "flat.fits", SIZE, &[], |x, y| if is_full(x, y) { WHITE } else { 7000.0 });
     let refused = shop.said(line, 1);
     assert!(refused.contains("nowhere are the photosites of all classes side by side"), "{refused}");
+}
+
+/// What fell off towards the corners was raised there, and its noise with it: of a sensor of 1 e⁻ per ADU the variance at a red photosite is
+/// that of light and read noise, and rounding, over g², and what the one flat field adds, where half the light falls.
+#[test]
+fn sigma_is_that_of_the_light_at_each_place() {
+    let shop = Workshop::new();
+    let variance = |signal: f64| signal + 36.0 + 1.0 / 12.0;
+    let exposed = |level: f64, seed| {
+        move |x: u32, y: u32| {
+            let signal = level * falloff(x, y);
+            BLACK + signal + (6.0 * (signal + 36.0)).sqrt() * chance(x, y, seed)
+        }
+    };
+    write_sensor(&shop, SIZE, 0.0, [0.0, 0.0, 6.0]);
+    write_fits(&shop, "light.fits", SIZE, &[("EXPTIME", "1.0")], exposed(4000.0, 1));
+    write_fits(&shop, "flat.fits", SIZE, &[("EXPTIME", "1.0")], exposed(7000.0, 2));
+    shop.said("correct-frame light.fits --black 500 --sensor s.yaml --flat flat.fits -o c.exr", 0);
+    shop.said("demosaic c.exr --method bi --sigma -o d.exr", 0);
+    let frame = shop.frame_with("d.exr", &["sigma.R"]);
+    let reds = || (0..SIZE[1]).step_by(2).flat_map(|y| (0..SIZE[0]).step_by(2).map(move |x| [x, y]));
+    // The mean of the flat field is that of whole cells.
+    let in_cells = || reds().filter(|[x, y]| x + 1 < SIZE[0] && y + 1 < SIZE[1]);
+    let mean = in_cells().map(|[x, y]| falloff(x, y)).sum::<f64>() / in_cells().count() as f64;
+    for from in [0.5, 0.6, 0.7, 0.8, 0.9] {
+        let (mut told, mut true_variance, mut count) = (0.0, 0.0, 0.0);
+        for [x, y] in reds().filter(|[x, y]| (from..from + 0.1).contains(&falloff(*x, *y))) {
+            let light = falloff(x, y);
+            let [signal, flat] = [4000.0, 7000.0].map(|level| level * light);
+            let share = light / mean;
+            true_variance += (variance(signal) + signal * signal * variance(flat) / (flat * flat)) / (share * share);
+            let row = (4 * y as usize + 3) * SIZE[0] as usize;
+            told += f64::from(frame.samples[row + x as usize]).powi(2);
+            count += 1.0;
+        }
+        // Levels scatter by 2 %, and their means over 100 photosites and more by a tenth of that.
+        assert!(
+            count > 100.0 && (told / true_variance - 1.0).abs() < 0.01,
+            "{from}: {} of {count}",
+            told / true_variance
+        );
+    }
 }
 
 /// What a dark frame has above a level is less than its noise of 3.3 ADU. Light on 78 % of a frame, or on 31 % in its middle, has no such

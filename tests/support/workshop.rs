@@ -151,8 +151,14 @@ impl Workshop {
 
     /// A whole frame in memory.
     pub fn frame(&self, name: &str) -> MemoryFrame {
+        self.frame_with(name, &[])
+    }
+
+    /// The same with the layers behind its channels.
+    pub fn frame_with(&self, name: &str, layers: &[&str]) -> MemoryFrame {
         let options = InputOptions { path: Some(self.path(name)), ..Default::default() };
         let mut reader = FrameReader::open(&options).unwrap();
+        assert!(layers.is_empty() || reader.keep(layers));
         let mut samples = Vec::new();
         reader.read(reader.header().geometry.height, &mut samples).unwrap();
         MemoryFrame::new(reader.header().clone(), samples)

@@ -1,5 +1,6 @@
 //! What corrections took off a frame of codes, as its metadata keep it.
 
+use super::illumination::Illumination;
 use super::records::{NoiseRecord, PoissonKind, is_false, is_no_charge};
 use crate::camera::levels::BlackLevel;
 use crate::names::{Named, serde_by_name};
@@ -281,6 +282,9 @@ pub struct FlatRecord {
     pub left_out: Vec<u64>,
     /// Whether the metadata of all its frames say that they were lit evenly.
     pub even: bool,
+    /// How they were lit, where that is not so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub illumination: Option<Illumination>,
     /// Exposure of the frames in s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_s: Option<f64>,

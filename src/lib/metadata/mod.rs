@@ -5,6 +5,7 @@ mod converter;
 mod correction;
 mod difference;
 mod header;
+mod illumination;
 mod levels;
 mod records;
 
@@ -16,6 +17,7 @@ pub use correction::{
 };
 pub use difference::Difference;
 pub use header::FrameHeader;
+pub use illumination::Illumination;
 pub use records::{
     AdaptationRecord, CameraSettings, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
     NoiseRecord, PoissonKind, PredictedRecord, ProfileRecord, RelativeMatrix, SamplesRecord, Scene, Seal, TakenAs,

@@ -237,8 +237,7 @@ impl Photosite {
     /// The same with what rounding does to the means of photosites as part of the fixed pattern, so that the causes of either kind add up
     /// to what is drawn anew in each exposure, and to what is not.
     fn told_apart(&self, mut budget: Budget, expected_e: f64) -> Budget {
-        let is_told =
-            self.adc.is_some() && self.flat.is_none() && self.equations == Equations::Exact && !self.has_tails();
+        let is_told = self.adc.is_some() && self.flat.is_none() && self.equations == Equations::Exact;
         let are_means = self.darks.iter().flatten().all(|dark| dark.combine == Combine::Mean);
         if !is_told || !are_means {
             return budget;
@@ -370,7 +369,8 @@ impl Photosite {
                 let fixed = self.shared(adc, (expected_e, None), (self, None), false).light;
                 let clipped = at_most(fixed, whole) - patterns;
                 let further = clipped - budget[Cause::ClippedPattern as usize];
-                let is_told = further.abs() > 1e-9 * patterns;
+                // What takes too long is no number, and stays none.
+                let is_told = further.is_nan() || further.abs() > 1e-9 * patterns;
                 budget[Cause::ClippedPattern as usize] += if is_told { further } else { 0.0 };
                 // What the ends and rounding do to patterns is none of what they do to the rest.
                 let own = if is_told { further } else { 0.0 };

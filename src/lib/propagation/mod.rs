@@ -37,6 +37,7 @@ mod pattern;
 pub mod photosite;
 mod pixel_drift;
 mod pixel_gains;
+mod pixel_light;
 mod pixel_lines;
 pub mod pixel_moments;
 pub mod pixels;

@@ -4,7 +4,8 @@
 //!
 //! cov(y, y') = E cov(y, y' | u) + cov(E(y|u), E(y'|u)).
 //!
-//! The means follow u as smoothly as read noise lets them, so that equal steps, a fraction of it, are exact to rounding.
+//! The means follow u as smoothly as what is drawn anew lets them, read noise alone at full well, so that equal steps, a fraction of it, are
+//! exact to rounding.
 
 use super::effort;
 use super::law::Law;
@@ -54,11 +55,22 @@ impl Photosite {
 /// What is no number, as it takes too long.
 const TOO_LONG: Shared = Shared { light: f64::NAN, dark: f64::NAN, both: f64::NAN, median: None };
 
+/// What the mean of a photosite follows offsets over, e⁻: what is drawn anew in it, where read noise blurs counts, and full well cuts
+/// none of it off before offsets come to it.
+fn blur_e(law: &Law) -> f64 {
+    /// Of single counts e^(−2π²σ²) is left, 3·10⁻⁹.
+    const BLURRED_E: f64 = 1.0;
+    match law.read_noise_e >= BLURRED_E && !law.reaches_full_well() {
+        true => law.light.shot_std().hypot(law.dark.shot_std()).hypot(law.read_noise_e),
+        false => law.read_noise_e,
+    }
+}
+
 /// What two laws share whose readings are off by σ z and σ' z, z normal.
 fn over_offsets(seen: &[Seen; 2], sigmas: &[f64; 2]) -> Shared {
     // Medians scatter less.
     let narrowing = |k: usize| seen[k].median_of.map_or(1.0, |count| f64::from(count).sqrt());
-    let steepness = |k: usize| sigmas[k] * narrowing(k) / seen[k].law.read_noise_e.max(1e-9);
+    let steepness = |k: usize| sigmas[k] * narrowing(k) / blur_e(&seen[k].law).max(1e-9);
     let steepest = steepness(0).max(steepness(1));
     let step = (1.0 + steepest * steepest).sqrt().recip() / 1.3;
     if step < 2.0 * REACH / MOST_STEPS {

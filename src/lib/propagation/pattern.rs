@@ -80,7 +80,11 @@ impl Shared {
         }
         let (of_light, of_dark) = (Temporal::of(light), Temporal::of(dark));
         let (law, is_fine) = (&light.law, light.is_fine || dark.is_fine);
-        let xs = sensitivities(&law.light, of_light.std());
+        let xs = if is_fine {
+            fine_sensitivities(&law.light, of_light.finest())
+        } else {
+            sensitivities(&law.light, of_light.std())
+        };
         let wider = if law.dark.rate > dark.law.dark.rate { law.dark } else { dark.law.dark };
         let ys = if is_fine {
             fine_sensitivities(&wider, of_light.finest().min(of_dark.finest()))
@@ -103,6 +107,11 @@ impl Shared {
         }
         let [along_light, along_dark] = [&law.light, &law.dark].map(Axis::of);
         let is_curved = is_fine || light.reading.is_bent() || dark.reading.is_bent();
+        let [along_light, along_dark] = match is_fine {
+            // Means follow every edge of the codes, over what a photosite scatters by.
+            true => [along_light.followed_over(of_light.std()), along_dark],
+            false => [along_light, along_dark],
+        };
         // Bends for the dark signal: of most photosites, of those without light, and of dark frames.
         let mut bends = of_light.knees(along_dark, along_light, 1.0, along_light.spread());
         bends.extend(of_light.knees(along_dark, along_light, 0.0, 0.0));
@@ -157,6 +166,8 @@ struct Axis {
     rate: f64,
     sigma: f64,
     is_shot: bool,
+    /// Widest panel, in standard deviations.
+    widest: f64,
 }
 
 /// Where the mean of a reading bends, in standard deviations of the sensitivity, and how wide the bend is.
@@ -167,14 +178,22 @@ struct Knee {
 }
 
 impl Axis {
-    /// Widest panel, in standard deviations.
+    /// Widest panel of what bends at knees alone, in standard deviations.
     const WIDEST: f64 = 3.0;
     /// Bends narrower than this are ends of panels.
     const NARROWEST: f64 = 1e-7;
 
     fn of(charge: &Charge) -> Self {
         let rate = charge.rate.max(0.0);
-        Self { rate, sigma: if rate > 0.0 { charge.pattern } else { 0.0 }, is_shot: charge.shot.is_some() }
+        let sigma = if rate > 0.0 { charge.pattern } else { 0.0 };
+        Self { rate, sigma, is_shot: charge.shot.is_some(), widest: Self::WIDEST }
+    }
+
+    /// The same for a function that changes over so many electrons wherever it is.
+    fn followed_over(self, std_e: f64) -> Self {
+        let panels = 2.0 * REACH / (3.0 * std_e / self.spread());
+        let widest = 2.0 * REACH / panels.min(MOST_IF_FINE / 12.0);
+        Self { widest: self.widest.min(widest), ..self }
     }
 
     /// Standard deviation of what the charge is over photosites, in e⁻.
@@ -210,12 +229,12 @@ impl Axis {
         let mut end = -REACH;
         while end < REACH {
             ends.push(end);
-            end += Self::WIDEST;
+            end += self.widest;
         }
         for knee in knees {
             ends.push(knee.z);
             let mut distance = 3.0 * knee.width.max(Self::NARROWEST);
-            while distance < Self::WIDEST {
+            while distance < self.widest {
                 ends.extend([knee.z - distance, knee.z + distance]);
                 distance *= 2.5;
             }

@@ -12,6 +12,7 @@ use super::lines::DRIFTING;
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::pixel_gains::{PixelGains, phase_at};
+use super::pixel_light::PixelVariances;
 use super::pixel_lines::PixelLines;
 use super::repeated::average_of;
 use super::smooth_hue;
@@ -43,7 +44,7 @@ pub struct PixelNoise {
     /// What each amplifier makes of photosites, where there are several.
     of_taps: Option<PixelTaps>,
     depends_on_hue: bool,
-    variances: [LevelVariance; 3],
+    variances: PixelVariances,
     /// What no light reads in the frame, in the unit of its samples.
     black: f64,
 }
@@ -158,7 +159,8 @@ impl PixelNoise {
             places().map(|at| gains(table, at, &frame.geometry)).collect()
         };
         let is_followed = photosite.check_tails([0.0; 3]).and_then(|()| photosite.check_lines(false));
-        is_followed.and_then(|()| photosite.check_flat()).map_err(|why| frame.refuse(why.to_string()))?;
+        let light = metadata.correction.as_ref().and_then(|correction| correction.flat.as_ref()?.illumination.as_ref());
+        is_followed.and_then(|()| photosite.check_flat_in(light)).map_err(|why| frame.refuse(why.to_string()))?;
         if photosite.drifts() && photosite.flat.is_some() {
             return Err(frame.refuse(DRIFTING));
         }
@@ -178,7 +180,8 @@ impl PixelNoise {
             .black_noise
             .map(|noise| (gains(PixelGains::of_black), [noise.row_adu2, noise.column_adu2, noise.site_adu2]));
         let gains = gains(PixelGains::new);
-        let variances = LevelVariance::of_classes(&photosite, average.as_ref(), largest);
+        let light = light.map(|light| (light, &frame.geometry));
+        let variances = PixelVariances::of(&photosite, average.as_ref(), largest, light);
         let of_taps = match frame.taps() {
             Some(_) => Some(pixel_taps(frame, table, kinds, average.as_ref(), &photosite)?),
             None => None,
@@ -195,7 +198,9 @@ impl PixelNoise {
     /// a code, it is that of an average over all places in a code.
     pub fn covariance(&self, [x, y]: [usize; 2], rgb: [f64; 3]) -> (Covariance, bool) {
         let kind = self.rows.kind(y) * self.columns.examples.len() + self.columns.kind(x);
-        let level = rgb.map(|sample| sample - self.black);
+        // What was divided by a flat field had this share of its light, and was so much less.
+        let share = self.variances.share([x, y]);
+        let level = rgb.map(|sample| (sample - self.black) * share);
         let all = |mut variances: [f64; 3], hues: Option<[f64; 3]>| {
             let lines = self.of_lines.as_ref().map(|lines| (lines, lines.at(level)));
             if let Some((lines, level)) = &lines {
@@ -217,10 +222,10 @@ impl PixelNoise {
                 let more = gains[kind].covariance(*of_black, hues);
                 covariance.iter_mut().zip(more).for_each(|(covariance, more)| *covariance += more);
             }
-            covariance
+            covariance.map(|covariance| covariance / (share * share))
         };
-        let is_told = !(0..3).any(|class| level[class] < self.variances[class].told_from());
-        let mut variances = [0, 1, 2].map(|class| self.variances[class].at(level[class]));
+        let is_told = self.variances.are_told(level);
+        let mut variances = self.variances.at(level, share);
         for (index, of_tap) in self.of_taps.iter().flat_map(|taps| taps.at(level)).enumerate() {
             variances[index % 3] = variances[index % 3].max(of_tap);
         }

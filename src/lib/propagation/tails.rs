@@ -398,6 +398,15 @@ impl Photosite {
         }
         budget
     }
+
+    /// What is drawn anew in each exposure where the rounding of codes shows: its mean over photosites of all kinds.
+    pub(super) fn mixed_temporal(&self, expected_e: f64) -> f64 {
+        let [jumps, ..] = self.jump_cumulants();
+        let drawn = |site: &Self| site.temporal_variance(expected_e, site.moments(expected_e).moments.variance);
+        let kinds = effort::within(MOST_WORK, || self.each_of(expected_e, true, drawn));
+        let of_kind = |kind: &Kind<f64>| kind.weight * (kind.value + if kind.is_free { jumps } else { 0.0 });
+        kinds.map_or(f64::NAN, |kinds| kinds.iter().map(of_kind).sum())
+    }
 }
 
 /// Moments 2 to 6 about the mean from cumulants, the fifth taken as none.

@@ -6,12 +6,13 @@
 //! classes are whole: of cells of the filter array none of whose photosites is saturated or defective. So the means of all classes are of the
 //! same places, and light that falls off towards the corners is the same share of each.
 
+mod blocks;
 mod tally;
 
 use crate::camera::levels::BlackLevels;
 use crate::error::Result;
 use crate::frame::to_sample;
-use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, MasterNoise, Scene};
+use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, Illumination, MasterNoise, Scene};
 use crate::stages::darks::{DarkFrames, DarkSettings, Fitness, Misfit, check_alike, check_codes, check_setting};
 use crate::stages::defects::{DefectMap, Survey, add};
 use crate::stages::masters::Frames;
@@ -19,6 +20,7 @@ use crate::stages::saturation::{DEFECTIVE, FullLevels, SATURATED};
 use crate::stages::sites::SiteClasses;
 use crate::stages::transfer::{Passage, Transfer};
 use crate::stream::RowSource;
+use blocks::Blocks;
 use std::ops::Range;
 use tally::Tally;
 
@@ -60,6 +62,8 @@ pub struct FlatMeans {
     pub full: u64,
     /// Ordinary values of F by class, ADU.
     limits: Option<Vec<[f64; 2]>>,
+    /// How they were lit.
+    illumination: Illumination,
     /// What is wrong with the array that they are said to be behind.
     pub doubt: Option<String>,
 }
@@ -249,7 +253,7 @@ impl<S: RowSource> FlatFrames<S> {
         let geometry = self.head.geometry.clone();
         let width = geometry.width;
         let classes = self.classes.count();
-        let mut tally = Tally::new(classes);
+        let mut tally = Tally::new(classes, Blocks::of(&geometry, classes));
         let mut survey = beyond.map(|_| Survey::new(classes, width * geometry.height));
         let rows_of_cell = self.cell()[1];
         let step = geometry.cached_rows().next_multiple_of(rows_of_cell);
@@ -320,8 +324,11 @@ impl<S: RowSource> FlatFrames<S> {
                 if tally.whole.get(cell) != Some(&true) {
                     continue;
                 }
+                let block = tally.blocks.of_place([cell * columns, first + row]);
                 for (x, flat) in (cell * columns..).zip(flats) {
-                    tally.take(of_row[x % of_row.len()], of_rows + (x + x0) % 2, *flat);
+                    let class = of_row[x % of_row.len()];
+                    tally.take(class, of_rows + (x + x0) % 2, *flat);
+                    tally.blocks.take(block, class, *flat);
                 }
             }
         }
@@ -368,7 +375,9 @@ impl<S: RowSource> FlatFrames<S> {
         }
         let left_out = good.iter().zip(counts).map(|(good, count)| good - count).collect();
         let doubt = self.doubt_of_array(tally);
-        Ok(FlatMeans { means, photosites: counts.clone(), left_out, full: full.iter().sum(), limits, doubt })
+        let illumination = tally.blocks.illumination(&means);
+        let full = full.iter().sum();
+        Ok(FlatMeans { means, photosites: counts.clone(), left_out, full, limits, illumination, doubt })
     }
 
     /// What is wrong with the array that they are said to be behind, Bayer or none, or that nothing tells, where what photosites scatter by
@@ -398,6 +407,7 @@ impl<S: RowSource> FlatFrames<S> {
             photosites: means.photosites.clone(),
             left_out: means.left_out.clone(),
             even: self.is_even,
+            illumination: (!self.is_even).then(|| means.illumination.clone()),
             exposure_s: metadata.time_s(),
             temperature_k: metadata.temperature_k(),
             // Where charge has spilled over, what was drawn is not the noise that it tells.

@@ -1,5 +1,6 @@
 //! What a first reading of flats adds up over their photosites.
 
+use super::blocks::Blocks;
 use crate::cfa::Places;
 use std::f64::consts::PI;
 
@@ -19,10 +20,12 @@ pub(super) struct Tally {
     pub(super) whole: Vec<bool>,
     /// Sums over the photosites at each place of the 2×2 at the sensor's corner, in whole cells, and how many.
     places: [(f64, f64); 4],
+    /// Sums over the photosites of whole cells by where they are.
+    pub(super) blocks: Blocks,
 }
 
 impl Tally {
-    pub(super) fn new(classes: usize) -> Self {
+    pub(super) fn new(classes: usize, blocks: Blocks) -> Self {
         let none = || vec![0; classes];
         Self {
             sums: vec![0.0; classes],
@@ -34,6 +37,7 @@ impl Tally {
             last: vec![None; classes],
             whole: Vec::new(),
             places: [(0.0, 0.0); 4],
+            blocks,
         }
     }
 

@@ -1,0 +1,92 @@
+//! How flat fields are lit: means over blocks of their photosites.
+
+use crate::frame::Geometry;
+use crate::metadata::Illumination;
+
+/// Blocks of a row, and of a column, at most: what light falls off by from one to the next is nearly straight.
+const MOST: usize = 16;
+/// Photosites along the side of a block at least, over which noise averages out.
+const LEAST_SIDE: usize = 16;
+
+/// Sums over blocks of photosites, of each class apart.
+pub(super) struct Blocks {
+    area: [i32; 4],
+    size: [usize; 2],
+    counts: [usize; 2],
+    classes: usize,
+    /// The sum of each class of each block, and of how many.
+    sums: Vec<(f64, f64)>,
+}
+
+impl Blocks {
+    /// Those of a frame with so many classes.
+    pub(super) fn of(geometry: &Geometry, classes: usize) -> Self {
+        let size = [geometry.width, geometry.height];
+        let counts = size.map(|side| (side / LEAST_SIDE).clamp(1, MOST));
+        let [width, height] = size.map(|side| i32::try_from(side).unwrap_or(i32::MAX));
+        let [x, y] = geometry.origin;
+        let sums = vec![(0.0, 0.0); counts[0] * counts[1] * classes];
+        Self { area: [x, y, width, height], size, counts, classes, sums }
+    }
+
+    /// The block at a place of the frame.
+    pub(super) fn of_place(&self, place: [usize; 2]) -> usize {
+        let [column, row] = [0, 1].map(|axis| place[axis] * self.counts[axis] / self.size[axis]);
+        row * self.counts[0] + column
+    }
+
+    /// Takes in a photosite.
+    pub(super) fn take(&mut self, block: usize, class: usize, flat: f64) {
+        let (sum, count) = &mut self.sums[block * self.classes + class];
+        *sum += flat;
+        *count += 1.0;
+    }
+
+    /// The illumination that they tell, of classes with such means; of a block without photosites that of the nearest that has some.
+    pub(super) fn illumination(&self, means: &[f64]) -> Illumination {
+        let share = |block: &[(f64, f64)]| {
+            let lit = block.iter().zip(means).filter(|((_, count), _)| *count > 0.0);
+            let (sum, count) =
+                lit.fold((0.0, 0.0), |all, (of_class, mean)| (all.0 + of_class.0 / mean, all.1 + of_class.1));
+            (count > 0.0).then(|| (sum / count).max(LEAST_SHARE))
+        };
+        let known: Vec<Option<f64>> = self.sums.chunks(self.classes).map(share).collect();
+        let columns = self.counts[0];
+        let distance = |a: usize, b: usize| {
+            (a % columns).abs_diff(b % columns).pow(2) + (a / columns).abs_diff(b / columns).pow(2)
+        };
+        let nearest = |block: usize| {
+            let all = known.iter().enumerate().filter_map(|(other, share)| Some((distance(block, other), (*share)?)));
+            all.min_by_key(|(distance, _)| *distance).map_or(1.0, |(_, share)| share)
+        };
+        let shares = known.iter().enumerate().map(|(block, share)| share.unwrap_or_else(|| nearest(block)));
+        Illumination::new(self.area, self.counts, shares.collect())
+    }
+}
+
+/// A block is lit at least so, where noise makes it seem darker.
+const LEAST_SHARE: f64 = 0.001;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Blocks of 48×32 photosites of two classes: each falls off in the same way, whatever its mean; a block without any is as the next.
+    #[test]
+    fn classes_are_taken_together() {
+        let geometry = Geometry { origin: [10, 20], ..Geometry::new(48, 32, &["plane"]) };
+        let mut blocks = Blocks::of(&geometry, 2);
+        for y in 0..32 {
+            for x in 0..48 {
+                let class = (x + y) % 2;
+                if x < 32 || y < 16 {
+                    let block = blocks.of_place([x, y]);
+                    blocks.take(block, class, [100.0, 700.0][class] * if x < 16 { 0.5 } else { 1.25 });
+                }
+            }
+        }
+        let light = blocks.illumination(&[100.0, 700.0]);
+        let wanted = Illumination::new([10, 20, 48, 32], [3, 2], vec![0.5, 1.25, 1.25, 0.5, 1.25, 1.25]);
+        assert_eq!(light, wanted);
+    }
+}
