@@ -26,6 +26,21 @@ pub(super) fn open_seekable(mut input: File, name: &str, part: usize) -> Opened 
     open_whole(readers, &head, input, name, part)
 }
 
+/// The same of a part that is there, or of the single one of a file that has no others: averages of exposures, say, of which each was
+/// a part of its file.
+pub(super) fn open_part_or_single(mut input: File, name: &str, part: usize) -> Opened {
+    let failed = |e| Error::disk(name, "read", e);
+    let start = input.stream_position().map_err(failed)?;
+    let mut open = |part: usize| {
+        // Files that are one have one place that is read next.
+        input.seek(SeekFrom::Start(start)).map_err(failed)?;
+        open_seekable(input.try_clone().map_err(failed)?, name, part)
+    };
+    let is_missing = |opened: &Opened| matches!(opened, Err(Error::Usage(_)));
+    let opened = open(part);
+    if is_missing(&opened) && (part == 1 || is_missing(&open(1))) { open(0) } else { opened }
+}
+
 /// Opens a stream.
 pub(super) fn open_unseekable(input: File, name: &str, part: usize) -> Opened {
     pipe::enlarge(&input);
