@@ -141,9 +141,10 @@ impl DngTag {
         if found < count || (found > count && !are_alike) {
             let has = if found > MOST { "more".to_owned() } else { found.to_string() };
             return Err(file.problem(format!(
-                "it is damaged; its {} has {has} numbers, and {count} {} asked for",
+                "it is damaged; its {} has {has} numbers, and {count} {} asked for{}",
                 self.1,
-                if count == 1 { "is" } else { "are" }
+                if count == 1 { "is" } else { "are" },
+                if self.0 == BLACK_LEVEL.0 { " by BlackLevelRepeatDim" } else { "" }
             )));
         }
         numbers.truncate(count);
