@@ -7,7 +7,7 @@ use crate::support;
 use cyanometer::frame::to_sample;
 use std::fs;
 use support::fits::{chance, write_fits, write_sensor};
-use support::workshop::{BAD_DATA, Workshop};
+use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 const SIZE: [u32; 2] = [384, 32];
 const DARK: (&str, &str) = ("IMAGETYP", "'Dark Frame'");
@@ -389,6 +389,31 @@ fn shifted_codes_beside_darks_that_are_not_are_told() {
     }
 }
 
+/// A part is that of dark frames too, unless they are the single part of their file, as averages are.
+#[test]
+fn parts_are_those_of_dark_frames() {
+    let shop = Workshop::new();
+    for (name, level, seed) in [("light", 1000.0, 1), ("dark", 500.0, 2)] {
+        let cards = [("EXPTIME", "3.0"), ("BUNIT", "'adu'")];
+        write_fits(&shop, "single.fits", SIZE, &cards, |x, y| level + 20.0 * chance(x, y, seed));
+        let bytes = shop.bytes("single.fits");
+        fs::write(shop.path(&format!("{name}.single.fits")), &bytes).unwrap();
+        let mut primary =
+            ["SIMPLE  = T", "BITPIX  = 16", "NAXIS   = 0", "END"].map(|card| format!("{card:<80}")).concat();
+        primary += &" ".repeat(2880 - primary.len());
+        let extension = format!("{:<80}", "XTENSION= 'IMAGE   '").into_bytes();
+        fs::write(shop.path(&format!("{name}.fits")), [primary.as_bytes(), &extension, &bytes[80..]].concat()).unwrap();
+    }
+    shop.run("correct-frame light.fits --part 1 --dark dark.fits -o parts.exr", &[]);
+    shop.run("correct-frame light.fits --part 1 --dark dark.single.fits -o mixed.exr", &[]);
+    shop.run("correct-frame light.single.fits --dark dark.single.fits -o single.exr", &[]);
+    let samples = |name: &str| shop.frame(name).samples.clone();
+    assert_eq!(samples("parts.exr"), samples("single.exr"));
+    assert_eq!(samples("mixed.exr"), samples("single.exr"));
+    let said = shop.said("correct-frame light.fits --part 2 --dark dark.fits -o out.exr", BAD_USAGE);
+    assert!(said.contains("light.fits: there is no part 2; its last one is 1"), "{said}");
+}
+
 /// Keywords are in s by the standard, and not always by those who write them.
 #[test]
 fn times_in_ms_that_files_tell_are_told() {
@@ -403,9 +428,9 @@ fn times_in_ms_that_files_tell_are_told() {
         ("33.3", 900.0, ""),
         ("30.0", 20_000.0, ""),
         (
-            "0.033 / [ms] exposure time",
+            "0.033 / exposure time in ms",
             900.0,
-            "its EXPTIME of 0.033 counts as s, as the standard has it, and its comment tells ms",
+            "its EXPTIME of 0.033 counts as s, as is the rule, and its comment tells ms",
         ),
         ("0.033 / exposure time in seconds", 900.0, ""),
     ] {

@@ -99,6 +99,45 @@ fn masked_photosites_without_a_black_level_are_told() {
     assert_eq!(said("whole.dng", &[white]), "");
 }
 
+/// Masks beside the active rows alone tell no row above them, and a rectangle leaves those out.
+#[test]
+fn rows_without_masked_photosites_are_left_out_by_a_rectangle() {
+    let shop = Workshop::new();
+    let strip: Vec<u8> = (0..120_u16).flat_map(|i| (300 + i % 5).to_le_bytes()).collect();
+    let areas: [(u16, &[u32]); 4] =
+        [(50714, &[0]), (50717, &[4000]), (50829, &[2, 4, 10, 12]), (50830, &[2, 0, 10, 4])];
+    fs::write(shop.path("raw.dng"), dng([12, 10], 16, 1, &strip, &areas)).unwrap();
+    shop.run("import-raw raw.dng --crop full -o raw.exr", &[]);
+    let said = shop.said("correct-frame raw.exr --black rows -o out.exr", BAD_DATA);
+    let wanted =
+        "not all of its rows have masked photosites, and those that have lie in the rectangle 0,2,12,8; give --crop";
+    assert!(said.contains(wanted), "{said}");
+    shop.run("correct-frame raw.exr --crop 0,2,12,8 --black rows -o out.exr", &[]);
+}
+
+/// Levels above the directory of the raw image do not count; tags that give samples of a TIFF another meaning neither.
+#[test]
+fn tags_that_do_not_count_are_told() {
+    let shop = Workshop::new();
+    let strip: Vec<u8> = (0..120_u16).flat_map(|i| (300 + i).to_le_bytes()).collect();
+    let whole = dng([12, 10], 16, 1, &strip, &[(50712, &[0, 10, 20])]);
+    let change = |bytes: &mut [u8], from: &[u8], to: &[u8]| {
+        let at = bytes.windows(from.len()).position(|window| window == from).unwrap();
+        bytes[at..at + to.len()].copy_from_slice(to);
+    };
+    // DNGVersion becomes a tag that nobody knows.
+    let mut tiff = whole.clone();
+    change(&mut tiff, &50706_u16.to_le_bytes(), &65000_u16.to_le_bytes());
+    fs::write(shop.path("raw.tif"), &tiff).unwrap();
+    let said = shop.said("preview raw.tif -o out.png", 0);
+    assert!(said.contains("raw.tif: its LinearizationTable is not applied: it has no DNGVersion"), "{said}");
+    let gray = [[6, 1, 4, 0, 1, 0, 0, 0].as_slice(), &32803_u32.to_le_bytes()].concat();
+    change(&mut tiff, &gray, &[[6, 1, 4, 0, 1, 0, 0, 0].as_slice(), &0_u32.to_le_bytes()].concat());
+    fs::write(shop.path("white.tif"), &tiff).unwrap();
+    let said = shop.said("preview white.tif -o white.png", 0);
+    assert!(said.contains("its PhotometricInterpretation is 0, by which white is 0"), "{said}");
+}
+
 /// What is made of the raw itself is what is made of the import.
 #[test]
 fn programs_read_the_raw_as_its_import() {

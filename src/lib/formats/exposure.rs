@@ -32,12 +32,20 @@ pub fn of_parts(
     notes: &mut Vec<String>,
 ) -> Option<ToldExposure> {
     let [time_name, aperture_name] = named;
+    let time_s = exposure_s.filter(|time_s| (0.0..f64::INFINITY).contains(time_s));
     match (exposure_s, f_number) {
         (Some(exposure_s), Some(f_number)) => {
             match (Exposure { exposure_s, f_number, lens_transmittance: 1.0 }).checked() {
                 Ok(exposure) => return Some(ToldExposure::Whole(exposure)),
-                Err(problem) => notes.push(format!("its exposure is passed over: {problem}")),
+                Err(problem) => {
+                    let rest =
+                        time_s.map_or(String::new(), |time| format!("; its time of {time} s tells dark frames apart"));
+                    notes.push(format!("its exposure is passed over: {problem}{rest}"));
+                }
             }
+        }
+        (Some(time), None) if time_s.is_none() => {
+            notes.push(format!("its exposure time of {time} s ({time_name}) is passed over: there is none"));
         }
         (Some(time), None) => notes.push(format!(
             "its exposure time of {time} s tells dark frames apart and no more: it has no f-number ({aperture_name})"
@@ -47,5 +55,5 @@ pub fn of_parts(
         }
         (None, None) => {}
     }
-    exposure_s.filter(|time_s| (0.0..f64::INFINITY).contains(time_s)).map(ToldExposure::Time)
+    time_s.map(ToldExposure::Time)
 }

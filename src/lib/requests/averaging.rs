@@ -226,7 +226,12 @@ impl Averaged {
         metadata.mask_bits.clear();
         if let Some(differs) = seen.exposures.unlike() {
             metadata.scene = None;
-            warnings.push(format!("{differs}; nothing is predicted of their average"));
+            let colored = if seen.exposures.differ_in_matrix() {
+                ", and the matrix and the white of the first make its colors (`relative_matrix`)"
+            } else {
+                ""
+            };
+            warnings.push(format!("{differs}; nothing is predicted of their average{colored}"));
         }
         // A median is what it would be while fewer than half of its samples are full.
         let least = if averaging.combine == Combine::Median { frames.div_ceil(2) } else { 1 };

@@ -64,7 +64,7 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
     // Counted from the sensor's corner.
     let deltas = |first: i32, what: &str| {
         let found: Option<Vec<f64>> = offs.iter().copied().collect();
-        let found = found.ok_or_else(|| frame.refuse(format!("not all of its {what} have masked photosites")))?;
+        let found = found.ok_or_else(|| uncovered(frame, &offs, options, border, what))?;
         let first = usize::try_from(first).map_err(|_| frame.refuse("it begins before the sensor's corner"))?;
         Ok::<_, Error>([vec![0.0; first], found].concat())
     };
@@ -89,6 +89,25 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
         frame.name,
         counts.iter().sum::<usize>()
     )))
+}
+
+/// The complaint about a frame not all of whose lines have masked photosites, with the rectangle that leaves such lines out where
+/// the others lie together.
+fn uncovered(frame: &FrameHeader, offs: &[Option<f64>], options: &InputOptions, border: Border, what: &str) -> Error {
+    let has = |off: &Option<f64>| off.is_some();
+    let problem = format!("not all of its {what} have masked photosites");
+    let ends = offs.iter().position(has).zip(offs.iter().rposition(has));
+    let Some((first, last)) = ends.filter(|(first, last)| offs[*first..=*last].iter().all(has)) else {
+        return frame.refuse(problem);
+    };
+    // A rectangle is counted from the first sample that is stored.
+    let [x, y] = options.crop.map_or([0, 0], |crop| [crop.x, crop.y]);
+    let (Geometry { width, height, .. }, count) = (&frame.geometry, last - first + 1);
+    let rectangle = match border {
+        Border::Columns => format!("{},{y},{count},{height}", x + first),
+        _ => format!("{x},{},{width},{count}", y + first),
+    };
+    frame.refuse(format!("{problem}, and those that have lie in the rectangle {rectangle}")).give(&["crop"])
 }
 
 /// The samples of masked photosites.

@@ -51,7 +51,7 @@ pub struct Correction {
         allow_hyphen_values = true
     )]
     pub black_choice: BlackChoice,
-    /// Dark frame to subtract sample by sample, read with the --raw, --channel and --crop of the input; given more than once,
+    /// Dark frame to subtract sample by sample, read with the --part, --raw, --channel and --crop of the input; given more than once,
     /// the average of all
     #[arg(long, value_name = "FILE", conflicts_with = "black")]
     pub dark: Vec<PathBuf>,

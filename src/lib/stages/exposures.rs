@@ -11,6 +11,7 @@ pub struct Exposures {
     head: FrameHeader,
     /// What the first that differs in more than the exposure differs in.
     unlike: Option<String>,
+    differ_in_matrix: bool,
     /// Those whose metadata tell their seed and number.
     drawn: ExposureSet,
     /// Sum of what the black level of each is uncertain by, which was measured in its own border.
@@ -25,7 +26,10 @@ impl Exposures {
     pub fn of(first: &FrameHeader) -> Self {
         let (head, drawn, by_digest) = (without_border(first), ExposureSet::default(), HashMap::new());
         let black_noise = first.metadata.black_noise;
-        let mut exposures = Self { first: first.clone(), head, unlike: None, drawn, black_noise, count: 1, by_digest };
+        let first_of_all = first.clone();
+        let (unlike, differ_in_matrix, count) = (None, false, 1);
+        let mut exposures =
+            Self { first: first_of_all, head, unlike, differ_in_matrix, drawn, black_noise, count, by_digest };
         // Runs of one frame that overlap are told by no other.
         first.drawn().into_iter().for_each(|run| _ = exposures.drawn.insert(run));
         exposures.by_digest.extend(digest(first).map(|digest| (digest, first.name.clone())));
@@ -52,6 +56,11 @@ impl Exposures {
         self.unlike.as_deref()
     }
 
+    /// Whether raw files tell other matrices (`relative_matrix`) of them, by their white balance say.
+    pub fn differ_in_matrix(&self) -> bool {
+        self.differ_in_matrix
+    }
+
     /// Takes in the next.
     ///
     /// # Errors
@@ -75,6 +84,7 @@ impl Exposures {
         }
         self.black_noise = self.black_noise.zip(frame.metadata.black_noise).map(|(sum, noise)| sum.plus(&noise));
         self.count += 1;
+        self.differ_in_matrix |= frame.metadata.relative_matrix != self.first.metadata.relative_matrix;
         let head = without_border(frame);
         if self.unlike.is_none() && head != self.head {
             let differs = match Difference::of([&head.metadata, &self.head.metadata]) {

@@ -87,7 +87,13 @@ pub(super) fn masked(
     place: [usize; 2],
 ) -> Result<Vec<[i64; 4]>> {
     let [width, height] = image.size.map(|side| side as u64);
-    let given = tags::MASKED_AREAS.unsigned(file, image.directory(), 4 * 64)?;
+    let given = tags::MASKED_AREAS.unsigned(file, image.directory(), 4 * MOST_AREAS + 1)?;
+    if let Some(given) = given.as_ref().filter(|given| given.len() % 4 != 0) {
+        let problem = "of four each, at most 64 of which are read";
+        return Err(
+            file.problem(format!("it is damaged; its MaskedAreas has {} numbers, no areas {problem}", given.len()))
+        );
+    }
     // Top, left, bottom and right, again and again.
     let beside = || {
         let (left, top) = (active.left as u64, active.top as u64);
@@ -113,6 +119,9 @@ pub(super) fn masked(
     };
     Ok(areas.into_iter().filter_map(on_sensor).collect())
 }
+
+/// Areas that are read.
+const MOST_AREAS: u64 = 64;
 
 /// Photosites beside the active area that light may leak into.
 const LEAK: u64 = 2;

@@ -7,6 +7,7 @@ use crate::color::calibration::{Calibration, Illuminated, Light};
 use crate::error::{Error, Result};
 use crate::formats::data::load_observer;
 use crate::formats::files::open_named;
+use crate::formats::register;
 use crate::formats::tiff::TiffFile;
 use crate::metadata::RelativeMatrix;
 use crate::names::Named;
@@ -51,10 +52,10 @@ pub(super) fn relative_matrix(
     image: &RawImage,
     notes: &mut Vec<String>,
 ) -> Result<Option<RelativeMatrix>> {
-    if image.is_monochrome || !tags::COLOR_MATRICES[0].is_in(&image.first) {
+    if image.is_monochrome || !has_matrix(image) {
         return Ok(None);
     }
-    let found = match found(file, image) {
+    let found = match found(file, image, notes) {
         Err(Error::Format { problem, .. }) => Err(problem),
         other => other?,
     };
@@ -71,7 +72,11 @@ pub(super) fn relative_matrix(
 }
 
 /// The matrix, or why it is passed over.
-fn found(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<RelativeMatrix, String>> {
+fn found(
+    file: &mut TiffFile,
+    image: &RawImage,
+    notes: &mut Vec<String>,
+) -> Result<std::result::Result<RelativeMatrix, String>> {
     let planes = tags::CFA_PLANE_COLOR.unsigned(file, image.directory(), 16)?;
     if planes.is_some_and(|planes| planes != [0, 1, 2]) {
         return Ok(Err("its classes are others than R, G and B (CFAPlaneColor)".into()));
@@ -80,7 +85,12 @@ fn found(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Re
         Ok(light) => light,
         Err(why) => return Ok(Err(why)),
     };
-    mapped(file, image, light, "the white of the exposure", OwnMatrix::Color)
+    mapped(file, image, light, "the white of the exposure", OwnMatrix::Color, notes)
+}
+
+/// Whether there is a matrix for an illuminant.
+fn has_matrix(image: &RawImage) -> bool {
+    tags::COLOR_MATRICES.iter().any(|tag| tag.is_in(&image.first))
 }
 
 /// Which of the matrices of a DNG.
@@ -113,17 +123,19 @@ pub fn own_matrix(path: &Path, light_named: Option<([f64; 2], String)>, which: O
     let (file, name) = open_named(Some(path))?;
     let mut file = TiffFile::open(file, &name)?;
     let image = RawImage::find(&mut file)?;
-    if image.is_monochrome || !tags::COLOR_MATRICES[0].is_in(&image.first) {
+    if image.is_monochrome || !has_matrix(&image) {
         return Err(Error::format(&name, "it tells no color matrix (ColorMatrix1)"));
     }
+    let mut notes = Vec::new();
     let (light, named) = match light_named {
         Some((xy, named)) => (Ok(Light::White(xy)), named),
         None => (light(&mut file, &image)?, "the white of the exposure".into()),
     };
     let found = match light {
-        Ok(light) => mapped(&mut file, &image, light, &named, which)?,
+        Ok(light) => mapped(&mut file, &image, light, &named, which, &mut notes)?,
         Err(why) => Err(format!("{why}; name a light by --illuminant or --temperature")),
     };
+    notes.into_iter().for_each(|note| register::doubt(format!("{name}: {note}")));
     found.map_err(|why| Error::format(&name, why))
 }
 
@@ -134,16 +146,17 @@ fn mapped(
     light: Light,
     named: &str,
     which: OwnMatrix,
+    notes: &mut Vec<String>,
 ) -> Result<std::result::Result<RelativeMatrix, String>> {
-    let calibration = match calibration(file, image)? {
-        Ok(calibration) => calibration,
+    let (calibration, first) = match calibration(file, image, notes)? {
+        Ok(found) => found,
         Err(why) => return Ok(Err(why)),
     };
     let (tag, adapted) = match which {
         OwnMatrix::Color => ("ColorMatrix", "not adapted"),
         OwnMatrix::Forward => ("ForwardMatrix", "adapted to D50"),
     };
-    let name = if calibration.second.is_some() { format!("{tag}1 and {tag}2") } else { format!("{tag}1") };
+    let name = if calibration.second.is_some() { format!("{tag}1 and {tag}2") } else { format!("{tag}{first}") };
     let observer = load_observer()?;
     let mapped = match which {
         OwnMatrix::Color => calibration.mapped(&observer, light),
@@ -167,14 +180,19 @@ fn light(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Li
         .ok_or_else(|| "nothing tells the white of the exposure (AsShotNeutral or AsShotWhiteXY)".to_owned()))
 }
 
-/// The matrices for one illuminant or two.
-fn calibration(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Calibration, String>> {
-    let first = &image.first;
-    if tags::COLOR_MATRIX_3.is_in(first) {
+/// The matrices for one illuminant or two, and the number of the first. Of two, one whose illuminant has no known temperature is passed
+/// over, with a note.
+fn calibration(
+    file: &mut TiffFile,
+    image: &RawImage,
+    notes: &mut Vec<String>,
+) -> Result<std::result::Result<(Calibration, usize), String>> {
+    let directory = &image.first;
+    if tags::COLOR_MATRIX_3.is_in(directory) {
         return Ok(Err("it has one for a third illuminant (ColorMatrix3), which is not supported".into()));
     }
     let mut matrix = |tag: DngTag| -> Result<Option<Matrix3<f64>>> {
-        Ok(tag.exactly::<9>(file, first)?.map(|elements| Matrix3::from_row_slice(&elements)))
+        Ok(tag.exactly::<9>(file, directory)?.map(|elements| Matrix3::from_row_slice(&elements)))
     };
     let [one, two] = tags::COLOR_MATRICES;
     let matrices = [matrix(one)?, matrix(two)?];
@@ -182,33 +200,44 @@ fn calibration(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Res
     let calibrations = [matrix(calibration_1)?, matrix(calibration_2)?];
     let [forward_1, forward_2] = tags::FORWARD_MATRICES;
     let forwards = [matrix(forward_1)?, matrix(forward_2)?];
-    let signature =
-        |file: &mut TiffFile, tag: DngTag| -> Result<String> { Ok(file.text(first, tag.tag())?.unwrap_or_default()) };
+    let signature = |file: &mut TiffFile, tag: DngTag| -> Result<String> {
+        Ok(file.text(directory, tag.tag())?.unwrap_or_default())
+    };
     // Those of the camera count where the profile was made for them.
     let [of_camera, of_profile] = tags::CALIBRATION_SIGNATURES;
     let counts = signature(file, of_camera)? == signature(file, of_profile)?;
     let mut set = |index: usize, color_matrix: Matrix3<f64>| -> Result<Illuminated> {
-        let known = tags::CALIBRATION_ILLUMINANTS[index].one(file, first)?.and_then(temperature_k);
+        let known = tags::CALIBRATION_ILLUMINANTS[index].one(file, directory)?.and_then(temperature_k);
         let camera_calibration = calibrations[index].filter(|_| counts).unwrap_or_else(Matrix3::identity);
         let forward_matrix = forwards[index];
         Ok(Illuminated { temperature_k: known.unwrap_or(0.0), color_matrix, camera_calibration, forward_matrix })
     };
-    let Some(one) = matrices[0].map(|matrix| set(0, matrix)).transpose()? else {
-        return Ok(Err("ColorMatrix1 is missing".into()));
-    };
-    let two = matrices[1].map(|matrix| set(1, matrix)).transpose()?;
-    if let Some(two) = &two
-        && (one.temperature_k == 0.0 || two.temperature_k == 0.0)
-    {
-        return Ok(Err(
-            "the temperature of an illuminant is not known (CalibrationIlluminant1, CalibrationIlluminant2)".into(),
-        ));
+    let mut sets = Vec::new();
+    for (index, matrix) in matrices.into_iter().enumerate() {
+        if let Some(matrix) = matrix {
+            sets.push((index + 1, set(index, matrix)?));
+        }
     }
-    let analog_balance = tags::ANALOG_BALANCE.exactly::<3>(file, first)?.unwrap_or([1.0; 3]);
+    if sets.len() > 1 && sets.iter().any(|(_, set)| set.temperature_k == 0.0) {
+        sets.retain(|(_, set)| set.temperature_k != 0.0);
+        if let [(kept, _)] = sets[..] {
+            notes.push(format!(
+                "its ColorMatrix{kept} counts alone: the temperature of the other's illuminant is not known (CalibrationIlluminant{})",
+                3 - kept
+            ));
+        }
+    }
+    let Some(((number, first), second)) = sets.split_first() else {
+        return Ok(Err(
+            "the temperatures of its illuminants are not known (CalibrationIlluminant1, CalibrationIlluminant2)".into(),
+        ));
+    };
+    let analog_balance = tags::ANALOG_BALANCE.exactly::<3>(file, directory)?.unwrap_or([1.0; 3]);
     if !analog_balance.iter().all(|gain| *gain > 0.0) {
         return Ok(Err("AnalogBalance has a number that is not above 0".into()));
     }
-    Ok(Ok(Calibration { first: one, second: two, analog_balance }))
+    let second = second.first().map(|(_, set)| *set);
+    Ok(Ok((Calibration { first: *first, second, analog_balance }, *number)))
 }
 
 /// Temperature of an illuminant by its number; none of those that have none.

@@ -8,7 +8,7 @@ use super::tags;
 use crate::cfa::{FILTERS, FilterArray};
 use crate::error::Result;
 use crate::formats::exposure::{self, ToldExposure};
-use crate::formats::tiff::{Directory, TiffFile, passed_over};
+use crate::formats::tiff::{Directory, TiffFile, passed_over, told_orientation};
 use crate::metadata::Metadata;
 use crate::text::visible;
 use crate::units::QuantityKind;
@@ -72,6 +72,19 @@ pub(super) fn doubt_of_black(image: &RawImage, active: Rectangle) -> Option<&'st
     )
 }
 
+/// A doubt of levels that the first directory has instead of that of the raw image below it, where they belong \[DNG2023, ch. 4].
+pub(super) fn doubt_of_place(image: &RawImage) -> Option<String> {
+    let tags = [tags::BLACK_LEVEL, tags::WHITE_LEVEL, tags::LINEARIZATION_TABLE, tags::ACTIVE_AREA];
+    let is_misplaced = |tag: &tags::DngTag| tag.is_in(&image.first) && !tag.is_in(image.directory());
+    let misplaced: Vec<_> = tags.into_iter().filter(is_misplaced).map(|tag| tag.1).collect();
+    (!misplaced.is_empty()).then(|| {
+        format!(
+            "its {} stands in its first directory, not in that of the raw image, where DNG has it: it does not count; correct its tags",
+            misplaced.join(" and ")
+        )
+    })
+}
+
 /// The notes on the part of the image that is read.
 ///
 /// # Errors
@@ -114,16 +127,16 @@ fn filters(file: &mut TiffFile, image: &RawImage, active: Rectangle) -> Result<F
     };
     // The periods that can be described; others are refused when the letters are read.
     let count = rows.saturating_mul(columns).min(1 << 16);
-    let codes = tags::CFA_PATTERN.unsigned(file, directory, count as u64)?.unwrap_or_default();
-    if codes.is_empty() || codes.len() < count {
+    let codes = tags::CFA_PATTERN.unsigned(file, directory, count as u64 + 1)?.unwrap_or_default();
+    if codes.is_empty() || codes.len() != count {
+        let found = if codes.len() > count { "more".to_owned() } else { codes.len().to_string() };
         return Err(file.problem(format!(
-            "it is damaged; its CFAPattern has {} filters, and CFARepeatPatternDim asks for {rows}x{columns}",
-            codes.len()
+            "it is damaged; its CFAPattern has {found} filters, and CFARepeatPatternDim asks for {rows}x{columns}"
         )));
     }
     let planes = tags::CFA_PLANE_COLOR.unsigned(file, directory, 16)?.unwrap_or_else(|| vec![0, 1, 2]);
     let mut letters = String::with_capacity(count);
-    for code in &codes[..count] {
+    for code in &codes {
         let letter = usize::try_from(*code).ok().and_then(|code| FILTERS.chars().nth(code));
         let Some(letter) = letter.filter(|_| planes.contains(code)) else {
             return Err(
@@ -173,17 +186,6 @@ fn told_exposure(
     };
     let (time, aperture) = (number(tags::EXPOSURE_TIME)?, number(tags::F_NUMBER)?);
     Ok(exposure_of(time, aperture, notes))
-}
-
-/// How a raw file says that its picture is turned, where it is; a note tells that nothing is turned here.
-pub(in crate::formats) fn told_orientation(number: Option<usize>, notes: &mut Vec<String>) -> Option<u16> {
-    let found = number.and_then(|number| u16::try_from(number).ok()).filter(|number| (2..=8).contains(number));
-    if let Some(number) = found {
-        notes.push(format!(
-            "rows and columns stay those of the sensor: its Orientation, {number}, is kept for a DNG that is made of it"
-        ));
-    }
-    found
 }
 
 /// The exposure of a raw file that tells so much of it; notes tell what is passed over.

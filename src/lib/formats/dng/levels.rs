@@ -40,7 +40,7 @@ impl Levels {
         reach: [usize; 2],
         sample: Sample,
     ) -> Result<Self> {
-        let white = tags::WHITE_LEVEL.exactly::<1>(file, image.directory())?.map_or(sample.largest(), |[white]| white);
+        let white = tags::WHITE_LEVEL.levels(file, image.directory(), 1)?.map_or(sample.largest(), |white| white[0]);
         let black = black(file, image, active)?;
         let highest = black.sites().into_iter().fold(f64::NEG_INFINITY, f64::max);
         if highest >= white {
@@ -90,14 +90,8 @@ fn black(file: &mut TiffFile, image: &RawImage, active: Rectangle) -> Result<Bla
         )));
     }
     let count = rows * columns;
-    let levels = tags::BLACK_LEVEL.numbers(file, directory, count as u64)?.unwrap_or_else(|| vec![0.0; count]);
-    if levels.len() < count {
-        return Err(file.problem(format!(
-            "it is damaged; its BlackLevel has {} numbers, and BlackLevelRepeatDim asks for {count}",
-            levels.len()
-        )));
-    }
-    let black = BlackLevel::repeating(columns, rows, &levels[..count]).ok_or_else(|| {
+    let levels = tags::BLACK_LEVEL.levels(file, directory, count)?.unwrap_or_else(|| vec![0.0; count]);
+    let black = BlackLevel::repeating(columns, rows, &levels).ok_or_else(|| {
         file.problem(format!(
             "its black level differs by {rows}x{columns} sites (BlackLevelRepeatDim); levels of 2x2 sites are supported"
         ))

@@ -117,13 +117,38 @@ impl DngTag {
     ///
     /// # Errors
     ///
-    /// As [`Self::numbers`]; when there are fewer.
+    /// As [`Self::numbers`]; when there are fewer or more.
     pub fn exactly<const N: usize>(self, file: &mut TiffFile, directory: &Directory) -> Result<Option<[f64; N]>> {
-        let Some(numbers) = self.numbers(file, directory, N as u64)? else { return Ok(None) };
+        let Some(numbers) = self.numbers(file, directory, N as u64 + 1)? else { return Ok(None) };
         let count = numbers.len();
-        <[f64; N]>::try_from(numbers)
-            .map(Some)
-            .map_err(|_| file.problem(format!("it is damaged; its tag {} has {count} of {N} numbers", self.1)))
+        <[f64; N]>::try_from(numbers).map(Some).map_err(|_| {
+            let has = if count > N { format!("more than {N} numbers") } else { format!("{count} of {N} numbers") };
+            file.problem(format!("it is damaged; its tag {} has {has}", self.1))
+        })
+    }
+
+    /// So many levels, or more that are all alike, as some cameras write one for each of their classes.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::numbers`]; when there are fewer, or more that differ.
+    pub fn levels(self, file: &mut TiffFile, directory: &Directory, count: usize) -> Result<Option<Vec<f64>>> {
+        /// Levels that are looked at; no filter array has more sites.
+        const MOST: usize = 1 << 12;
+        let Some(mut numbers) = self.numbers(file, directory, MOST as u64 + 1)? else { return Ok(None) };
+        let found = numbers.len();
+        let are_alike = found <= MOST && numbers.iter().all(|number| *number == numbers[0]);
+        if found < count || (found > count && !are_alike) {
+            let has = if found > MOST { "more".to_owned() } else { found.to_string() };
+            return Err(file.problem(format!(
+                "it is damaged; its {} has {has} numbers, and {count} {} asked for{}",
+                self.1,
+                if count == 1 { "is" } else { "are" },
+                if self.0 == BLACK_LEVEL.0 { " by BlackLevelRepeatDim" } else { "" }
+            )));
+        }
+        numbers.truncate(count);
+        Ok(Some(numbers))
     }
 
     /// So many whole numbers that are not negative.

@@ -495,8 +495,16 @@ fn what_cannot_be_read_is_refused_by_name() {
         (image.clone().with(50713, SHORT, &[0.0, 2.0]), "its BlackLevelRepeatDim is 0x2"),
         (
             image.clone().with(50713, SHORT, &[2.0, 2.0]).with(50714, SHORT, &[1.0]),
-            "its BlackLevel has 1 numbers, and BlackLevelRepeatDim asks for 4",
+            "its BlackLevel has 1 numbers, and 4 are asked for",
         ),
+        (image.clone().with(50714, SHORT, &[1.0, 2.0, 3.0, 4.0]), "its BlackLevel has 4 numbers, and 1 is asked for"),
+        (
+            image.clone().with(50713, SHORT, &[2.0, 2.0]).with(50714, SHORT, &[1.0, 1.0, 2.0, 2.0, 1.0]),
+            "its BlackLevel has 5 numbers, and 4 are asked for",
+        ),
+        (image.clone().with(50717, SHORT, &[4000.0, 4001.0]), "its WhiteLevel has 2 numbers, and 1 is asked for"),
+        (image.clone().with(33422, BYTE, &[0.0, 1.0, 1.0, 2.0, 0.0]), "its CFAPattern has more filters"),
+        (image.clone().with(50829, LONG, &[0.0, 0.0, 6.0, 8.0, 1.0]), "its tag ActiveArea has more than 4 numbers"),
         (
             image.clone().with(50713, SHORT, &[1.0, 3.0]).with(50714, SHORT, &[1.0, 2.0, 1.0]),
             "its black level differs by 1x3 sites",
@@ -534,10 +542,43 @@ fn what_cannot_be_read_is_refused_by_name() {
         let said = refused(&image);
         assert!(said.starts_with("a.dng: ") && said.contains(wanted) && !said.contains('\n'), "{said}, not {wanted}");
     }
+    // One level of each class, all alike, is one level.
+    let alike = image.clone().with(50714, SHORT, &[64.0; 4]).with(50717, SHORT, &[4000.0; 3]);
+    let reader = open(&alike.file(&[]), RawArea::Active).unwrap();
+    assert_eq!(reader.own_tags().black_level_adu, Some(BlackLevel::Uniform(64.0)));
+    assert_eq!(reader.own_tags().white_level_adu, Some(WhiteLevel::Uniform(4000.0)));
     let crop = image.clone().with(50719, LONG, &[1.0, 0.0]).with(50720, LONG, &[8.0, 6.0]);
     let reader = open(&crop.file(&[]), RawArea::Active).unwrap();
     assert!(reader.notes()[0].ends_with("does not lie in that area, which has 8x6; it is passed over"));
     assert!(open(&crop.file(&[]), RawArea::Default).is_err());
+}
+
+/// A matrix whose illuminant is known counts without the other; what has other than its numbers does not.
+#[test]
+fn matrices_of_unknown_illuminants_are_passed_over() {
+    let matrix =
+        |scale: f64| [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0].map(|element| [element * scale, 10.0]).concat();
+    let image = Image::new(8, 6, 12).strips(&samples(48, 12, 1), 6, Image::plain);
+    let image = image.with(50728, RATIO, &[9.0, 10.0, 10.0, 10.0, 9.0, 10.0]).with(50721, SIGNED_RATIO, &matrix(9.0));
+    let both = image.clone().with(50722, SIGNED_RATIO, &matrix(8.0));
+    let told = |image: &Image| {
+        let reader = open(&image.file(&[]), RawArea::Active).unwrap();
+        let method = reader.own_tags().relative_matrix.as_ref().map(|matrix| matrix.method.clone());
+        (method.unwrap_or_default(), reader.notes().join("; "))
+    };
+    let illuminants =
+        |one: f64, other: f64| told(&both.clone().with(50778, SHORT, &[one]).with(50779, SHORT, &[other]));
+    assert!(illuminants(17.0, 21.0).0.starts_with("ColorMatrix1 and ColorMatrix2 of the DNG"));
+    let (method, notes) = illuminants(255.0, 21.0);
+    assert!(method.starts_with("ColorMatrix2 of the DNG"), "{method}: {notes}");
+    assert!(notes.contains("its ColorMatrix2 counts alone") && notes.contains("(CalibrationIlluminant1)"), "{notes}");
+    assert!(illuminants(17.0, 0.0).0.starts_with("ColorMatrix1 of the DNG"));
+    assert!(illuminants(0.0, 255.0).1.contains("the temperatures of its illuminants are not known"));
+    assert!(told(&both.clone().without(50721).with(50779, SHORT, &[21.0])).0.starts_with("ColorMatrix2 of the DNG"));
+    let long = told(&image.clone().with(50721, SIGNED_RATIO, &[1.0; 24]));
+    assert!(long.0.is_empty() && long.1.contains("its tag ColorMatrix1 has more than 9 numbers"), "{}", long.1);
+    let four = told(&image.with(50728, RATIO, &[1.0; 8]));
+    assert!(four.0.is_empty() && four.1.contains("its tag AsShotNeutral has more than 3 numbers"), "{}", four.1);
 }
 
 /// Whatever is cut off or changed: a result or an error, and what is cut off is never taken.

@@ -11,11 +11,23 @@ const CARD_BYTES: usize = 80;
 /// A header may have this many bytes.
 const MOST_BYTES: usize = 64 << 20;
 /// Keywords that are kept besides those that begin with `NAXIS`; a header may have very many.
-const KEPT: [&str; 36] = [
+const KEPT: [&str; 37] = [
     "SIMPLE", "XTENSION", "BITPIX", "PCOUNT", "GCOUNT", "GROUPS", "ZIMAGE", "BSCALE", "BZERO", "BLANK", "BUNIT",
     "EXTNAME", "BAYERPAT", "COLORTYP", "XBAYROFF", "YBAYROFF", "ROWORDER", "EXPTIME", "EXPOSURE", "EXPOINUS",
     "FOCALLEN", "APTDIA", "FOCRATIO", "CCD-TEMP", "GAIN", "EGAIN", "PEDESTAL", "OFFSET", "BLKLEVEL", "INSTRUME",
-    "READOUTM", "XBINNING", "YBINNING", "IMAGETYP", "FRAME", "OBSTYPE",
+    "READOUTM", "XBINNING", "YBINNING", "IMAGETYP", "FRAME", "OBSTYPE", "INHERIT",
+];
+/// Keywords of one part alone, which another never inherits, besides those that begin with `NAXIS`.
+const OF_ONE_PART: [&str; 12] = [
+    "SIMPLE", "XTENSION", "BITPIX", "PCOUNT", "GCOUNT", "GROUPS", "ZIMAGE", "BSCALE", "BZERO", "BLANK", "EXTNAME",
+    "INHERIT",
+];
+/// Keywords for one thing: a header that has one of them tells it.
+const FOR_ONE_THING: [&[&str]; 4] = [
+    &["EXPTIME", "EXPOSURE", "EXPOINUS"],
+    &["BAYERPAT", "COLORTYP"],
+    &["IMAGETYP", "FRAME", "OBSTYPE"],
+    &["OFFSET", "BLKLEVEL"],
 ];
 
 /// The value of a card.
@@ -31,14 +43,21 @@ pub(super) enum Value {
     Other,
 }
 
+/// A value and the comment behind it.
+#[derive(Debug, Clone)]
+struct Card {
+    value: Value,
+    comment: String,
+}
+
 /// The cards of a part whose keywords are of use; of several with one keyword the first counts.
 #[derive(Debug, Default)]
 pub(super) struct Header {
-    cards: BTreeMap<String, Value>,
+    cards: BTreeMap<String, Card>,
     /// Keywords that stand there again with another value.
     pub repeated: BTreeSet<String>,
-    /// Keywords whose comment tells milliseconds.
-    pub in_ms: BTreeSet<String>,
+    /// Keywords that the primary header has and this one lacks, which does not inherit them.
+    pub not_inherited: Vec<String>,
     /// Its bytes, in whole blocks.
     pub bytes: u64,
 }
@@ -77,14 +96,7 @@ impl Header {
                 if let Some(value) = rest.strip_prefix("= ")
                     && (KEPT.contains(&keyword) || keyword.starts_with("NAXIS"))
                 {
-                    if tells_ms(value) {
-                        header.in_ms.insert(keyword.to_owned());
-                    }
-                    let value = value_of(value);
-                    let counts = header.cards.entry(keyword.to_owned()).or_insert_with(|| value.clone());
-                    if *counts != value {
-                        header.repeated.insert(keyword.to_owned());
-                    }
+                    header.take(keyword, card_of(value));
                 }
             }
             if block.len() < BLOCK_BYTES {
@@ -94,16 +106,55 @@ impl Header {
         Err(Error::format(name, "its header is longer than 64 MiB; no header is"))
     }
 
-    /// A header of these cards.
+    /// Takes a card, of which the first with its keyword counts.
+    fn take(&mut self, keyword: &str, card: Card) {
+        let value = card.value.clone();
+        if self.cards.entry(keyword.to_owned()).or_insert(card).value != value {
+            self.repeated.insert(keyword.to_owned());
+        }
+    }
+
+    /// A header of these cards, each without a comment.
     #[cfg(test)]
     pub fn of(cards: &[(&str, Value)]) -> Self {
-        let cards = cards.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+        let card = |value: &Value| Card { value: value.clone(), comment: String::new() };
+        let cards = cards.iter().map(|(key, value)| ((*key).to_owned(), card(value))).collect();
         Self { cards, ..Self::default() }
+    }
+
+    /// Takes from the primary header what this one, of an extension, does not tell itself, where its INHERIT is T \[FITS4,
+    /// App. K]; else notes which keywords these are. A unit of samples is one of the primary array where there is such an array.
+    pub fn inherit(&mut self, primary: &Self) {
+        let is_of_array = |key: &str| key == "BUNIT" && primary.number("NAXIS") != Some(0.0);
+        let is_shared = |key: &str| !key.starts_with("NAXIS") && !OF_ONE_PART.contains(&key) && !is_of_array(key);
+        let told: Vec<_> = primary.cards.iter().filter(|(key, _)| is_shared(key) && !self.tells(key)).collect();
+        if self.is_true("INHERIT") {
+            let told: Vec<_> = told.into_iter().map(|(key, card)| (key.clone(), card.clone())).collect();
+            self.repeated.extend(told.iter().map(|(key, _)| key.clone()).filter(|key| primary.repeated.contains(key)));
+            self.cards.extend(told);
+        } else {
+            self.not_inherited = told.into_iter().map(|(key, _)| key.clone()).collect();
+        }
+    }
+
+    /// Whether it has a keyword, or another for the same thing.
+    fn tells(&self, key: &str) -> bool {
+        let alike = FOR_ONE_THING.into_iter().find(|keys| keys.contains(&key));
+        alike.unwrap_or(&[key]).iter().any(|key| self.cards.contains_key(*key))
+    }
+
+    /// The comment behind the value of a keyword.
+    pub fn comment(&self, key: &str) -> &str {
+        self.cards.get(key).map_or("", |card| &card.comment)
+    }
+
+    fn value(&self, key: &str) -> Option<&Value> {
+        self.cards.get(key).map(|card| &card.value)
     }
 
     /// The number of a keyword, which some programs write as a text; none where there is none.
     pub fn number(&self, key: &str) -> Option<f64> {
-        match self.cards.get(key)? {
+        match self.value(key)? {
             Value::Number(number) => Some(*number),
             Value::Text(text) => text.trim().parse().ok().filter(|number: &f64| number.is_finite()),
             Value::Logical(_) | Value::Other => None,
@@ -112,7 +163,7 @@ impl Header {
 
     /// The text of a keyword, without spaces around it; none where there is none, or nothing else.
     pub fn text(&self, key: &str) -> Option<&str> {
-        match self.cards.get(key)? {
+        match self.value(key)? {
             Value::Text(text) => Some(text.trim()).filter(|text| !text.is_empty()),
             _ => None,
         }
@@ -120,7 +171,7 @@ impl Header {
 
     /// Whether a keyword is `T`.
     pub fn is_true(&self, key: &str) -> bool {
-        self.cards.get(key) == Some(&Value::Logical(true))
+        self.value(key) == Some(&Value::Logical(true))
     }
 }
 
@@ -129,27 +180,39 @@ fn text(card: &[u8]) -> Option<&str> {
     std::str::from_utf8(card).ok().filter(|text| text.bytes().all(|byte| (b' '..=b'~').contains(&byte)))
 }
 
-/// The value behind `= `, without the comment \[FITS4, Sec. 4.2].
-fn value_of(text: &str) -> Value {
+/// The value behind `= `, and the comment behind it \[FITS4, Sec. 4.2].
+fn card_of(text: &str) -> Card {
     let text = text.trim_start();
-    if let Some(quoted) = text.strip_prefix('\'') {
-        // A quote within the text is written twice.
-        let mut value = String::new();
-        let mut rest = quoted;
-        while let Some((before, after)) = rest.split_once('\'') {
-            value += before;
-            match after.strip_prefix('\'') {
-                Some(after) => {
-                    value.push('\'');
-                    rest = after;
-                }
-                None => return Value::Text(value.trim_end().to_owned()),
-            }
+    let (value, rest) = match text.strip_prefix('\'') {
+        Some(quoted) => quoted_text(quoted).unwrap_or((Value::Other, "")),
+        None => {
+            let (value, _) = text.split_once('/').unwrap_or((text, ""));
+            (plain_value(value.trim()), &text[value.len()..])
         }
-        return Value::Other;
+    };
+    let comment = rest.trim_start().strip_prefix('/').unwrap_or("").trim();
+    Card { value, comment: comment.to_owned() }
+}
+
+/// A text behind its first quote, and what follows the last one; none without one. A quote within the text is written twice.
+fn quoted_text(quoted: &str) -> Option<(Value, &str)> {
+    let (mut text, mut rest) = (String::new(), quoted);
+    loop {
+        let (before, after) = rest.split_once('\'')?;
+        text += before;
+        match after.strip_prefix('\'') {
+            Some(after) => {
+                text.push('\'');
+                rest = after;
+            }
+            None => return Some((Value::Text(text.trim_end().to_owned()), after)),
+        }
     }
-    let (value, _) = text.split_once('/').unwrap_or((text, ""));
-    match value.trim() {
+}
+
+/// A value that is no text.
+fn plain_value(value: &str) -> Value {
+    match value {
         "T" => Value::Logical(true),
         "F" => Value::Logical(false),
         // Exponents of double precision begin with D.
@@ -158,13 +221,6 @@ fn value_of(text: &str) -> Value {
             _ => Value::Other,
         },
     }
-}
-
-/// Whether the comment behind a number names milliseconds: `/ [ms] exposure time`.
-fn tells_ms(text: &str) -> bool {
-    let comment = text.split_once('/').map(|(_, comment)| comment.to_ascii_lowercase()).unwrap_or_default();
-    let mut words = comment.split(|letter: char| !letter.is_ascii_alphabetic());
-    words.any(|word| ["ms", "msec", "msecs"].contains(&word) || word.starts_with("millisec"))
 }
 
 /// What stands behind a header.

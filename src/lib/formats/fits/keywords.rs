@@ -1,15 +1,13 @@
 //! What keywords tell of the camera. Those of filter arrays are no part of the standard; programs agree on most of them.
 
 use super::header::{Header, whole};
+use super::units::{LENGTH, TEMPERATURE, TIME, number_of};
 use crate::cfa::FilterArray;
 use crate::formats::exposure::{self, ToldExposure};
 use crate::metadata::{CameraSettings, Metadata, TakenAs};
-use crate::text::{in_digits, ms_in_s, visible};
-use crate::units::{QuantityKind, kelvin};
+use crate::text::{in_decimals, in_digits, visible};
+use crate::units::QuantityKind;
 use std::ops::RangeInclusive;
-
-/// Microseconds in a second.
-const US_PER_S: f64 = 1e6;
 
 /// Keywords of one thing whose numbers differ by more than this contradict each other; what is less is written with other digits.
 const SAME_NUMBER: f64 = 1e-3;
@@ -40,6 +38,7 @@ pub(super) struct Told {
 /// of ADU.
 pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     let (mut notes, mut doubts) = (Vec::new(), doubts_of_repeated(header));
+    doubts.extend(doubt_of_primary(header));
     let is_bottom_up = is_bottom_up(header, &mut notes, &mut doubts);
     let cfa = filters(header, channels, &mut notes, &mut doubts);
     let unit = header.text("BUNIT").map(str::trim).filter(|unit| !unit.is_empty());
@@ -52,10 +51,10 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     }
     metadata.cfa = cfa;
     metadata.camera = header.text("INSTRUME").map(|camera| visible(camera).into_owned());
-    let exposure = told_exposure(header, told_time(header, &mut doubts), &mut notes, &mut doubts);
+    let exposure = told_exposure(header, &mut notes, &mut doubts);
     ToldExposure::describe(exposure, &mut metadata);
     metadata.taken_as = taken_as(header, &mut doubts);
-    metadata.sensor_temperature_k = told_temperature(header, &mut notes);
+    metadata.sensor_temperature_k = told_temperature(header, &mut notes, &mut doubts);
     metadata.camera_settings = told_settings(header);
     note_settings(header, &mut notes);
     Told { metadata, is_bottom_up, notes, doubts }
@@ -162,6 +161,17 @@ fn doubts_of_repeated(header: &Header) -> Vec<String> {
     header.repeated.iter().map(doubt).collect()
 }
 
+/// A doubt of what the primary header alone tells, where the extension that is read does not inherit it.
+fn doubt_of_primary(header: &Header) -> Option<String> {
+    let keys = header.not_inherited.join(", ");
+    (!keys.is_empty()).then(|| {
+        format!(
+            "its primary header has {keys}, and this part neither has them nor says INHERIT = T: they do not count; write \
+             INHERIT = T into the part's header if they hold for it, INHERIT = F and the keywords themselves if not"
+        )
+    })
+}
+
 /// The first number of several keywords for one thing; a doubt of another that differs from it by more than a share.
 fn first_of(what: &str, told: &[(&str, Option<f64>)], share: f64, doubts: &mut Vec<String>) -> Option<f64> {
     let mut known = told.iter().filter_map(|(key, number)| Some((*key, (*number)?)));
@@ -174,20 +184,9 @@ fn first_of(what: &str, told: &[(&str, Option<f64>)], share: f64, doubts: &mut V
 }
 
 /// Exposure time in s.
-fn told_time(header: &Header, doubts: &mut Vec<String>) -> Option<f64> {
-    let told = [
-        ("EXPTIME", header.number("EXPTIME")),
-        ("EXPOSURE", header.number("EXPOSURE")),
-        ("EXPOINUS", header.number("EXPOINUS").map(|us| us / US_PER_S)),
-    ];
-    let in_ms = told.iter().find(|(key, time)| time.is_some() && header.in_ms.contains(*key) && *key != "EXPOINUS");
-    doubts.extend(in_ms.map(|(key, time_s)| {
-        let time_s = time_s.unwrap_or_default();
-        format!(
-            "its {key} of {time_s} counts as s, as the standard has it, and its comment tells ms; {}",
-            ms_in_s(time_s)
-        )
-    }));
+fn told_time(header: &Header, notes: &mut Vec<String>, doubts: &mut Vec<String>) -> Option<f64> {
+    let told = [("EXPTIME", "s"), ("EXPOSURE", "s"), ("EXPOINUS", "us")]
+        .map(|(key, unit)| (key, number_of(header, key, &TIME, unit, notes, doubts)));
     first_of("exposure time in s", &told, SAME_NUMBER, doubts)
 }
 
@@ -225,35 +224,30 @@ fn kind_of(text: &str) -> Option<TakenAs> {
 }
 
 /// The temperature of the sensor in K.
-fn told_temperature(header: &Header, notes: &mut Vec<String>) -> Option<f64> {
-    let celsius = header.number("CCD-TEMP")?;
-    let kelvin = kelvin(celsius);
+fn told_temperature(header: &Header, notes: &mut Vec<String>, doubts: &mut Vec<String>) -> Option<f64> {
+    let kelvin = number_of(header, "CCD-TEMP", &TEMPERATURE, "degrees Celsius", notes, doubts)?;
     let is_possible = SENSOR_K.contains(&kelvin);
     if !is_possible {
-        notes.push(format!(
-            "its CCD-TEMP of {celsius} degrees Celsius is passed over: it is no temperature of a sensor"
-        ));
+        let kelvin = in_decimals(kelvin, 2);
+        notes.push(format!("its CCD-TEMP, {kelvin} K, is passed over: it is no temperature of a sensor"));
     }
     is_possible.then_some(kelvin)
 }
 
 /// Exposure time and f-number, or the time alone; the transmittance of the lens, which no keyword has, is 1.
-fn told_exposure(
-    header: &Header,
-    exposure_s: Option<f64>,
-    notes: &mut Vec<String>,
-    doubts: &mut Vec<String>,
-) -> Option<ToldExposure> {
-    let told = [("FOCALLEN and APTDIA", told_ratio(header, doubts)), ("FOCRATIO", header.number("FOCRATIO"))];
+fn told_exposure(header: &Header, notes: &mut Vec<String>, doubts: &mut Vec<String>) -> Option<ToldExposure> {
+    let exposure_s = told_time(header, notes, doubts);
+    let told = [("FOCALLEN and APTDIA", told_ratio(header, notes, doubts)), ("FOCRATIO", header.number("FOCRATIO"))];
     let f_number = first_of("f-number", &told, SAME_APERTURE, doubts);
     exposure::of_parts(exposure_s, f_number, ["EXPTIME", "FOCALLEN and APTDIA, or FOCRATIO"], notes)
 }
 
 /// The focal length over the diameter of the aperture, both in mm as programs write them; none of what no lens has, which is told.
-fn told_ratio(header: &Header, doubts: &mut Vec<String>) -> Option<f64> {
+fn told_ratio(header: &Header, notes: &mut Vec<String>, doubts: &mut Vec<String>) -> Option<f64> {
     /// f-numbers that lenses and telescopes have.
     const LENSES: RangeInclusive<f64> = 0.3..=1000.0;
-    let [length, diameter] = ["FOCALLEN", "APTDIA"].map(|key| header.number(key).filter(|mm| *mm > 0.0));
+    let [length, diameter] =
+        ["FOCALLEN", "APTDIA"].map(|key| number_of(header, key, &LENGTH, "mm", notes, doubts).filter(|mm| *mm > 0.0));
     let (length, diameter) = (length?, diameter?);
     let ratio = length / diameter;
     if LENSES.contains(&ratio) {

@@ -7,5 +7,6 @@ mod keywords;
 mod read;
 #[cfg(test)]
 mod tests;
+mod units;
 
 pub use read::{FORMAT, FitsReader};

@@ -81,13 +81,15 @@ impl FitsReader {
     pub fn open(mut file: File, name: &str, part: usize) -> Result<Self> {
         let failed = |e| Error::disk(name, "read", e);
         let mut place = file.stream_position().map_err(failed)?;
+        let mut primary = None;
         for number in 0..=part {
-            let Some((header, array)) = part_at(&mut file, place, name)? else {
+            let Some((mut header, array)) = part_at(&mut file, place, name)? else {
                 return Err(Error::Usage(format!("{name}: there is no part {part}; its last one is {}", number - 1)));
             };
             let data = place + header.bytes;
             if number < part {
                 place = data + array.padded_bytes();
+                primary.get_or_insert(header);
                 continue;
             }
             if !array.is_image() {
@@ -95,6 +97,7 @@ impl FitsReader {
                 let after = next_image(&mut file, data + array.padded_bytes(), part + 1, name).unwrap_or(None);
                 return Err(no_image(name, part, &array.kind, after));
             }
+            primary.iter().for_each(|primary| header.inherit(primary));
             return Self::placed(name, &header, array, file, data);
         }
         Err(Error::cut_short(name))

@@ -6,7 +6,7 @@ use super::read::FitsReader;
 use crate::error::Result;
 use crate::formats::format::{SampleReader, SampleType};
 use crate::formats::read_ahead::Pipe;
-use crate::metadata::CameraSettings;
+use crate::metadata::{CameraSettings, TakenAs};
 use crate::units::QuantityKind;
 use std::fs::File;
 use std::io::{Cursor, Seek, Write};
@@ -208,6 +208,97 @@ fn parts_are_chosen() {
     assert_eq!(complaint(&empty()), "in.fits: its part 0 holds no image");
 }
 
+/// What the primary header tells counts for an extension that says so, and is warned of where it does not.
+#[test]
+fn keywords_of_the_primary_header_are_inherited() {
+    let opened = |primary: Vec<u8>, more: &[(&str, &str)]| {
+        let image = part(("XTENSION", "'IMAGE   '"), &["3", "2"], more, &[1, 2, 3, 4, 5, 6]);
+        let mut reader = FitsReader::open(file(&[primary, image].concat()), "in.fits", 1).unwrap();
+        let mut samples = Vec::new();
+        reader.read(2, &mut samples).unwrap();
+        (reader, samples)
+    };
+    let told = [
+        ("ROWORDER", "'BOTTOM-UP'"),
+        ("EXPTIME", "500.0 / [ms]"),
+        ("IMAGETYP", "'DARK'"),
+        ("BUNIT", "'adu'"),
+        ("BZERO", "7"),
+        ("INSTRUME", "'one'"),
+    ];
+    let empty = || part(("SIMPLE", "T"), &[], &told, &[]);
+    let (reader, samples) = opened(empty(), &[("INHERIT", "T"), ("BAYERPAT", "'RGGB'"), ("INSTRUME", "'other'")]);
+    // The structure of the primary array is its own.
+    assert_eq!(samples, [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]);
+    let metadata = reader.own_tags();
+    assert_eq!((metadata.exposure_time_s, metadata.camera.as_deref()), (Some(0.5), Some("other")));
+    assert_eq!((metadata.taken_as, metadata.quantity), (Some(TakenAs::Dark), QuantityKind::Adu));
+    let with_array = part(("SIMPLE", "T"), &["3", "2"], &told, &[7; 6]);
+    assert_eq!(opened(with_array, &[("INHERIT", "T")]).0.own_tags().quantity, QuantityKind::Unspecified);
+    for inherit in [&[][..], &[("INHERIT", "F")]] {
+        let (reader, samples) = opened(empty(), inherit);
+        assert_eq!((samples[0], reader.own_tags().exposure_time_s), (1.0, None));
+    }
+    let header = |cards: &[(&str, Value)]| Header::of(cards);
+    let doubts = |extension: &[(&str, Value)], primary: &[(&str, Value)]| {
+        let mut extension = header(extension);
+        extension.inherit(&header(primary));
+        keywords::read(&extension, 1, true).doubts.concat()
+    };
+    let primary = [("NAXIS", Value::Number(0.0)), ("EXPTIME", Value::Number(3.0)), ("GAIN", Value::Number(100.0))];
+    let lost = doubts(&[], &primary);
+    assert!(lost.starts_with("its primary header has EXPTIME, GAIN, and this part neither has them"), "{lost}");
+    let inherit = ("INHERIT", Value::Logical(true));
+    assert_eq!(doubts(&[inherit], &primary), "");
+    // Another keyword tells the time.
+    assert_eq!(doubts(&[("EXPOSURE", Value::Number(2.0)), ("GAIN", Value::Number(1.0))], &primary), "");
+}
+
+/// A unit between brackets at the start of a comment is that of the number \[FITS4, Sec. 4.3.2]; another word is a doubt.
+#[test]
+fn comments_name_units() {
+    let told = |cards: &[(&str, &str)]| {
+        let cards = [&[("SIMPLE", "T")], cards].concat();
+        let header = Header::read(&mut Cursor::new(header(&cards)), "in.fits").unwrap().unwrap();
+        keywords::read(&header, 1, true)
+    };
+    let time = |value: &str| {
+        let told = told(&[("EXPTIME", value)]);
+        (told.metadata.exposure_time_s.unwrap(), told.doubts.concat())
+    };
+    for (value, time_s) in [
+        ("33000.0 / [us] integration", 0.033),
+        ("33 / [ms]", 0.033),
+        ("2.0 / [min] exposure", 120.0),
+        ("'1.5' / [Sec.] as text", 1.5),
+        ("3 / [s] not in ms", 3.0),
+        ("3 / exposure in seconds, to the ms", 3.0),
+        ("3 / the camera's exposure", 3.0),
+        ("3 / [INDI] exposure", 3.0),
+        ("0 / microseconds", 0.0),
+    ] {
+        assert_eq!(time(value), (time_s, String::new()), "{value}");
+    }
+    for (value, wanted) in [
+        (
+            "33000 / microseconds",
+            "its EXPTIME of 33000 counts as s, as is the rule, and its comment tells us; 33000 us is 0.033 s",
+        ),
+        ("33 / in ms", "33 ms is 0.033 s, which a comment that begins with [ms] says"),
+        ("2.0 / minutes", "2 min is 120 s"),
+    ] {
+        let (time_s, doubt) = time(value);
+        assert!(doubt.contains(wanted) && time_s > 1.0, "{value}: {doubt}");
+    }
+    assert_eq!(told(&[("EXPOINUS", "500 / microseconds")]).metadata.exposure_time_s, Some(5e-4));
+    let kelvin = |value: &str| told(&[("CCD-TEMP", value)]).metadata.sensor_temperature_k;
+    let values = ["90.0 / [K]", "-10 / [C] of the sensor", "-10 / CCD temperature", "14.0 / [degF]", "263.15"];
+    assert_eq!(values.map(kelvin), [Some(90.0), Some(263.15), Some(263.15), Some(263.15), None]);
+    assert!(told(&[("CCD-TEMP", "90 / in Kelvin")]).doubts[0].contains("its comment tells K"));
+    let lens = told(&[("EXPTIME", "1.0"), ("FOCALLEN", "40 / [cm]"), ("APTDIA", "100 / in mm")]);
+    assert_eq!((lens.metadata.exposure.unwrap().f_number, lens.doubts.len()), (4.0, 0));
+}
+
 #[test]
 fn damage_is_told() {
     let whole = plane(&[("ROWORDER", "'TOP-DOWN'")]);
@@ -317,6 +408,8 @@ fn keywords_of_the_camera_are_used_or_told() {
     // Flats and darks need no f-number.
     let seconds = |value: f64| told(&[("EXPTIME", number(value))]).0.exposure_time_s;
     assert_eq!([2.5, 0.0, -1.0].map(seconds), [Some(2.5), Some(0.0), None]);
+    let notes = told(&[("EXPTIME", number(-1.0))]).1;
+    assert_eq!(notes, "its exposure time of -1 s (EXPTIME) is passed over: there is none");
     let (metadata, notes) = told(&[("EXPTIME", number(0.0)), ("FOCRATIO", number(4.0))]);
     assert_eq!(metadata.exposure, None);
     assert!(notes.starts_with("its exposure is passed over: an exposure of 0 s is impossible"));

@@ -21,7 +21,7 @@ use self::checks::Checks;
 use self::described::DigestCheck;
 use self::kept::{LEFT_OUT, Taken, count_marks, cut, left_out};
 use self::metadata::{Found, doubt_of_marks, find_metadata, placed, take_scaling};
-use self::opening::{head_of, is_file, of_upstream, open_piped, open_seekable, open_unseekable, readers_of};
+use self::opening::{head_of, is_file, of_upstream, open_part, open_piped, readers_of};
 use super::dng::{DngReader, RawArea};
 use super::files::{named, open_named, spool};
 use super::format::{ColorTags, Rest, SampleReader, SampleType, U16_FULL_SCALE};
@@ -151,8 +151,7 @@ impl FrameReader {
     pub fn open_file(input: File, name: &str, path: Option<&Path>, options: &InputOptions) -> Result<Self> {
         let reader = match options.raw {
             Some(layout) => headerless::open(input, name, options.part, layout)?,
-            None if is_file(&input, name)? => open_seekable(input, name, options.part)?,
-            None => open_unseekable(input, name, options.part)?,
+            None => open_part(input, name, options.part, options.or_single_part)?,
         };
         Self::of(reader, name, path, options)
     }

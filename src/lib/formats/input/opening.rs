@@ -16,8 +16,17 @@ pub(super) fn is_file(input: &File, name: &str) -> Result<bool> {
     Ok(input.metadata().map_err(|e| Error::disk(name, "read", e))?.is_file())
 }
 
+/// Opens a part of a file or stream, or, where that may be, the single one of a file that has no others.
+pub(super) fn open_part(input: File, name: &str, part: usize, or_single: bool) -> Opened {
+    match is_file(&input, name)? {
+        false => open_unseekable(input, name, part),
+        true if or_single => open_part_or_single(input, name, part),
+        true => open_seekable(input, name, part),
+    }
+}
+
 /// Opens a file that can seek with the reader of its format.
-pub(super) fn open_seekable(mut input: File, name: &str, part: usize) -> Opened {
+fn open_seekable(mut input: File, name: &str, part: usize) -> Opened {
     let failed = |e| Error::disk(name, "read", e);
     let start = input.stream_position().map_err(failed)?;
     let head = head_of(&mut input, name)?;
@@ -26,8 +35,23 @@ pub(super) fn open_seekable(mut input: File, name: &str, part: usize) -> Opened 
     open_whole(readers, &head, input, name, part)
 }
 
+/// The same of a part that is there, or of the single one of a file that has no others: averages of exposures, say, of which each was
+/// a part of its file.
+fn open_part_or_single(mut input: File, name: &str, part: usize) -> Opened {
+    let failed = |e| Error::disk(name, "read", e);
+    let start = input.stream_position().map_err(failed)?;
+    let mut open = |part: usize| {
+        // Copies of an open file share the place that is read next.
+        input.seek(SeekFrom::Start(start)).map_err(failed)?;
+        open_seekable(input.try_clone().map_err(failed)?, name, part)
+    };
+    let is_missing = |opened: &Opened| matches!(opened, Err(Error::Usage(_)));
+    let opened = open(part);
+    if is_missing(&opened) && (part == 1 || is_missing(&open(1))) { open(0) } else { opened }
+}
+
 /// Opens a stream.
-pub(super) fn open_unseekable(input: File, name: &str, part: usize) -> Opened {
+fn open_unseekable(input: File, name: &str, part: usize) -> Opened {
     pipe::enlarge(&input);
     open_piped(Pipe::of(input), name, part)
 }

@@ -16,6 +16,8 @@ pub struct InputOptions {
     pub sequence: Option<Sequence>,
     /// Part of a multi-part EXR, page of a TIFF, HDU of a FITS.
     pub part: usize,
+    /// Whether a file of a single part is read whichever part is named.
+    pub or_single_part: bool,
     /// How the samples lie in a file without a header; none where the file says what it is.
     pub raw: Option<headerless::Layout>,
     /// A file whose metadata count before all others.

@@ -78,7 +78,7 @@ fn tiff_end(file: File, name: &str) -> Result<u64> {
     let mut end = 0;
     for page in 0..MOST_IMAGES {
         let directory = match file.directory(page) {
-            Err(Error::Format { .. }) => break,
+            Err(Error::Format { .. } | Error::Usage(_)) => break,
             other => other?,
         };
         end = end.max(chunks_end(&mut file, &directory)?);

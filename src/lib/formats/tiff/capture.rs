@@ -9,9 +9,10 @@ use crate::cfa::{FILTERS, FilterArray};
 use crate::error::Result;
 use crate::formats::exposure::{self, ToldExposure};
 use crate::formats::format::SampleType;
+use crate::formats::register;
 use crate::metadata::Metadata;
 use crate::units::QuantityKind;
-use tiff::tags::Tag;
+use tiff::tags::{PhotometricInterpretation, Tag};
 
 /// CFARepeatPatternDim: rows and columns of the period.
 const CFA_DIMENSIONS: Tag = Tag::Unknown(33421);
@@ -29,6 +30,7 @@ const BLACK_LEVEL: Tag = Tag::Unknown(50714);
 /// What columns and rows add to the black level.
 const BLACK_DELTAS: [Tag; 2] = [Tag::Unknown(50715), Tag::Unknown(50716)];
 const WHITE_LEVEL: Tag = Tag::Unknown(50717);
+const LINEARIZATION_TABLE: Tag = Tag::Unknown(50712);
 /// ActiveArea: top, left, bottom, right; the pattern and the levels begin at its corner.
 const ACTIVE_AREA: Tag = Tag::Unknown(50829);
 
@@ -44,7 +46,10 @@ const MOST_SITES: u64 = 64;
 /// [`crate::error::Error::Disk`] alone: damage is a note.
 pub(super) fn read(file: &mut TiffFile, directory: &Directory, layout: &mut Layout) -> Result<Metadata> {
     let mut metadata = Metadata::new(QuantityKind::Unspecified);
+    doubts(file, directory, layout)?;
     let notes = &mut layout.notes;
+    let orientation = passed_over(file.one(directory, Tag::Orientation), "its Orientation", notes)?;
+    metadata.orientation = told_orientation(orientation.and_then(|number| usize::try_from(number).ok()), notes);
     let exposure = passed_over(told_exposure(file, directory, notes), "its exposure", notes)?;
     ToldExposure::describe(exposure, &mut metadata);
     let is_cfa = [CFA_DIMENSIONS, CFA_PATTERN].iter().any(|tag| directory.has(*tag))
@@ -71,6 +76,34 @@ pub(super) fn read(file: &mut TiffFile, directory: &Directory, layout: &mut Layo
     Ok(metadata)
 }
 
+/// Doubts of samples that tags give another meaning than the stored one, which counts.
+fn doubts(file: &mut TiffFile, directory: &Directory, layout: &Layout) -> Result<()> {
+    let photometric = file.one(directory, Tag::PhotometricInterpretation)?;
+    let is_white_zero = photometric == Some(PhotometricInterpretation::WhiteIsZero.to_u16().into());
+    let of_white = "its PhotometricInterpretation is 0, by which white is 0, and its samples count as they are stored, more for more \
+                    light; invert them if 0 is white, or write 1 into the tag if not";
+    let of_table = "its LinearizationTable is not applied: it has no DNGVersion, and is read as a TIFF; give it that tag, or apply the table";
+    for (is_so, doubt) in
+        [(is_white_zero && !layout.inverted, of_white), (directory.has(LINEARIZATION_TABLE), of_table)]
+    {
+        if is_so {
+            register::doubt(file.problem(doubt).to_string());
+        }
+    }
+    Ok(())
+}
+
+/// How a file says that its picture is turned, where it is; a note tells that nothing is turned here.
+pub(in crate::formats) fn told_orientation(number: Option<usize>, notes: &mut Vec<String>) -> Option<u16> {
+    let found = number.and_then(|number| u16::try_from(number).ok()).filter(|number| (2..=8).contains(number));
+    if let Some(number) = found {
+        notes.push(format!(
+            "rows and columns stay those that are stored: its Orientation, {number}, is kept for a DNG that is made of it"
+        ));
+    }
+    found
+}
+
 fn is_integer(stored: SampleType) -> bool {
     !matches!(stored, SampleType::F16 | SampleType::F32 | SampleType::F64)
 }
@@ -86,7 +119,8 @@ pub(super) fn told_exposure(
     for directory in [Some(directory), below.as_ref()].into_iter().flatten() {
         for (value, tag) in found.iter_mut().zip([EXPOSURE_TIME, F_NUMBER]) {
             if value.is_none() {
-                *value = file.ratio(directory, tag)?;
+                // Lenses without contacts leave zeros, and cameras that do not know the time.
+                *value = file.ratio(directory, tag)?.filter(|number| *number > 0.0);
             }
         }
     }
@@ -106,7 +140,7 @@ fn active_corner(file: &mut TiffFile, directory: &Directory) -> Result<[i64; 2]>
 ///
 /// Where the tags are damaged, one of them is missing, or the array is of a kind that cannot be described.
 fn filters(file: &mut TiffFile, directory: &Directory, first: [i64; 2]) -> Result<Option<FilterArray>> {
-    let size = file.unsigned(directory, CFA_DIMENSIONS, 2)?;
+    let size = file.unsigned(directory, CFA_DIMENSIONS, 3)?.filter(|size| size.len() == 2);
     let pattern = file.numbers(directory, CFA_PATTERN, MOST_SITES + 1)?;
     let (Some(size), Some(pattern)) = (size, pattern) else {
         return Err(file.problem("its tags do not say which filters stand where"));
@@ -130,7 +164,7 @@ fn black(file: &mut TiffFile, directory: &Directory, first: [i64; 2]) -> Result<
     if BLACK_DELTAS.iter().any(|tag| directory.has(*tag)) {
         return Err(file.problem("it differs among rows or columns, which is read of a DNG alone"));
     }
-    let size = file.unsigned(directory, BLACK_DIMENSIONS, 2)?.unwrap_or_else(|| vec![1, 1]);
+    let size = file.unsigned(directory, BLACK_DIMENSIONS, 3)?.unwrap_or_else(|| vec![1, 1]);
     let (rows, columns) = match size[..] {
         [rows @ 1..=2, columns @ 1..=2] if rows * columns == levels.len() as u64 => (rows, columns),
         _ => return Err(file.problem(format!("{} levels do not repeat after two rows and columns", levels.len()))),
@@ -225,6 +259,14 @@ mod tests {
     }
 
     #[test]
+    fn turned_pictures_say_so_and_times_of_zero_are_none() {
+        let tags = [(274, TagValue::Shorts(vec![6])), (33434, TagValue::Ratios(vec![[0, 1]]))];
+        let (metadata, notes) = told(&plane(), TiffSamples::U16, &[&pattern(2, 2, &[0, 1, 1, 2]), &tags[..]].concat());
+        assert_eq!((metadata.orientation, metadata.exposure_time_s), (Some(6), None));
+        assert!(notes.concat().contains("its Orientation, 6, is kept"), "{notes:?}");
+    }
+
+    #[test]
     fn other_arrays_are_described_or_passed_over() {
         let x_trans: Vec<u8> = "GBGGRGRGRBGBGBGGRGGRGGBGBGBRGRGRGGBG"
             .bytes()
@@ -276,7 +318,7 @@ mod tests {
             ),
             (
                 vec![(33434, TagValue::Ratios(vec![[1, 8]])), (33437, TagValue::Ratios(vec![[0, 1]]))],
-                "its exposure is passed over: an f-number of 0 is impossible",
+                "its exposure time of 0.125 s tells dark frames apart and no more: it has no f-number (FNumber)",
             ),
             (vec![(34665, TagValue::Longs(vec![9_999_999]))], "its Exif is passed over: the table of tags lies beyond"),
         ] {

@@ -140,11 +140,13 @@ impl TiffFile {
         let mut offset = self.first_directory;
         loop {
             if offset == 0 {
-                return Err(self.problem(match seen.len() {
-                    0 => "the file holds no image".to_owned(),
-                    1 => format!("there is no image {page} (counted from 0); the file holds one"),
-                    n => format!("there is no image {page} (counted from 0); the file holds {n}"),
-                }));
+                let held = match seen.len() {
+                    0 => return Err(self.problem("the file holds no image")),
+                    1 => "one".to_owned(),
+                    n => n.to_string(),
+                };
+                let problem = format!("there is no image {page} (counted from 0); the file holds {held}");
+                return Err(Error::Usage(format!("{}: {problem}", self.name)));
             }
             if !seen.insert(offset) {
                 return Err(self.problem(format!(

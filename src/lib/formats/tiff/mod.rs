@@ -19,6 +19,7 @@ mod tags;
 mod tests;
 mod write;
 
+pub(in crate::formats) use capture::told_orientation;
 pub(in crate::formats) use chunk::Predictor;
 pub use directory::{Directory, TiffFile, begins_so};
 pub use exif::{exif_block, exposure_of_block};

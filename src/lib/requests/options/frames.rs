@@ -87,9 +87,10 @@ impl Input {
         InputOptions { all_channels: true, ..self.options() }
     }
 
-    /// Another frame of the same camera, of which the same part of the sensor is read; its metadata are its own.
+    /// Another frame of the same camera, of which the same part of file and sensor is read, or the single part of its file; its metadata
+    /// are its own.
     pub fn beside(&self, path: &Path) -> InputOptions {
-        Selection { part: 0, ..self.selection.clone() }.of(path)
+        InputOptions { or_single_part: true, ..self.selection.of(path) }
     }
 }
 
