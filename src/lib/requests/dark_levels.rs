@@ -1,6 +1,6 @@
 //! What came off a frame and cannot well be its dark signal, by its mean.
 
-use crate::camera::levels::{BlackLevel, LEAST_OF_BIAS, OF_COOLED};
+use crate::camera::levels::{BlackLevel, LEAST_OF_BIAS, OF_COOLED, near_black};
 use crate::camera::readout::ReadOut;
 use crate::formats::input::TOO_DARK;
 use crate::formats::register;
@@ -245,6 +245,18 @@ fn most_level(frame: &FrameHeader, darks: &DarkStack, is_bias: bool) -> Option<(
 fn dark_charge_e(readout: &ReadOut, (time_s, temperature_k): (Option<f64>, Option<f64>)) -> Option<f64> {
     let [ordinary, hot] = readout.dark_charges_e(temperature_k.unwrap_or(readout.temperature_k), time_s)?;
     Some(ordinary + readout.hot_pixel_share * hot)
+}
+
+/// The most dark signal that a frame of a black level can well have, ADU: ten times what its sensor predicts; of other cameras as much as the
+/// black level in [`LONG_S`], which is the time of a frame that tells none.
+pub(super) fn most_dark_signal(frame: &FrameHeader, black: f64) -> f64 {
+    let metadata = &frame.metadata;
+    let Some(readout) = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref()) else {
+        return near_black(black).max(black) * metadata.time_s().map_or(1.0, |time_s| time_s / LONG_S);
+    };
+    let conditions = (metadata.time_s().or(Some(UNTOLD_S)), metadata.temperature_k());
+    let slope = metadata.adu_per_e().unwrap_or(readout.adu_per_e);
+    TIMES * slope * dark_charge_e(readout, conditions).unwrap_or_default()
 }
 
 /// The bias of the sensor that is named, and the dark signal that it predicts of what comes off, ADU; of dark frames that do not tell

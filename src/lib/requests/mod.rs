@@ -19,6 +19,8 @@
 pub mod averaging;
 pub mod batch;
 pub mod border;
+mod border_doubts;
+mod border_lines;
 pub mod comparison;
 pub mod conversion;
 pub mod correction;
