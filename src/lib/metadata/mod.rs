@@ -6,6 +6,7 @@ mod correction;
 mod difference;
 mod header;
 mod levels;
+mod ranges;
 mod records;
 
 pub use black_noise::BlackNoise;

@@ -134,7 +134,8 @@ impl Masked {
         let Geometry { width, height, origin, .. } = frame.geometry;
         let first = origin.map(i64::from);
         let is_within = |[left, top, wide, high]: &[i64; 4], place: [i64; 2]| {
-            (*left..left + wide).contains(&place[0]) && (*top..top + high).contains(&place[1])
+            (*left..left.saturating_add(*wide)).contains(&place[0])
+                && (*top..top.saturating_add(*high)).contains(&place[1])
         };
         let (mut photosites, mut samples) = (Vec::new(), Vec::new());
         for y in 0..u32::try_from(height).unwrap_or(u32::MAX) {

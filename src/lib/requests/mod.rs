@@ -27,6 +27,7 @@ pub mod correction;
 mod dark_levels;
 pub mod described;
 pub mod fit;
+mod frame_levels;
 pub mod independence;
 pub mod measurement;
 pub mod options;
