@@ -2,7 +2,7 @@
 
 use super::border_lines::{Lean, Z};
 use super::dark_levels::most_dark_signal;
-use super::described::of_another_sensor;
+use super::other_sensor::of_another_sensor;
 use crate::camera::levels::{BlackLevel, near_black};
 use crate::error::Result;
 use crate::metadata::FrameHeader;

@@ -2,8 +2,9 @@
 
 use super::notes::Note;
 use super::options::Input;
+use super::other_sensor::of_another_sensor;
 use super::values;
-use crate::camera::levels::{BlackLevel, BlackLevels, levels_of_bias};
+use crate::camera::levels::{BlackLevel, BlackLevels};
 use crate::camera::optics::{Exposure, doubt_of_aperture, doubt_of_time};
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
@@ -300,22 +301,6 @@ pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>>
     }
     let other = other_black(frame, black).or_else(|| of_another_sensor(frame, black, &format!("--black {said}")));
     Ok(other.map(Note::Warning))
-}
-
-/// A warning of a level to subtract from codes of a camera that is far from the bias of the sensor which is named; what it counts of dark
-/// signal is a small share of the range. `said` is what the level is called.
-pub(super) fn of_another_sensor(frame: &FrameHeader, black: BlackLevel, said: &str) -> Option<String> {
-    let metadata = &frame.metadata;
-    let are_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
-    if !are_codes || metadata.adc.is_some() || metadata.correction.is_some() {
-        return None;
-    }
-    let sensor = metadata.sensor.as_ref()?;
-    let readout = sensor.readout.as_ref()?;
-    let (level, bias) = (black.mean(), readout.bias_adu);
-    let [least, most] = levels_of_bias(bias, f64::from((1_u32 << readout.bits) - 1));
-    (level < least || level > most)
-        .then(|| format!("{}: {said} is far from the bias of {}, {bias} ADU", frame.name, sensor.name))
 }
 
 /// A warning of a level to subtract that the metadata contradict.

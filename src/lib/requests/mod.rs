@@ -38,6 +38,7 @@ pub mod sensor;
 pub mod values;
 
 mod notes;
+mod other_sensor;
 mod raw_files;
 mod scene;
 
