@@ -88,7 +88,7 @@ mod tests {
     /// Codes about a level, times a scale.
     fn levels(name: &str, level: f32, scale: f32) -> FrameLevels {
         let mut levels = FrameLevels::of(name);
-        let samples: Vec<f32> = (0_u16..400).map(|i| scale * (level + f32::from(i * 37 % 41) - 20.0)).collect();
+        let samples: Vec<f32> = (0_u16..410).map(|i| scale * (level + f32::from(i * 37 % 41) - 20.0)).collect();
         levels.take(&samples);
         levels
     }
