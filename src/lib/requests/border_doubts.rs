@@ -26,7 +26,9 @@ impl MeasuredLevel {
     /// Those of [`FrameHeader::black_levels`].
     pub(super) fn doubts(&self, frame: &FrameHeader) -> Result<Vec<String>> {
         let known = frame.black_levels()?.filter(|known| !known.has_deltas()).map(|known| known.level());
-        let other = known.and_then(|known| self.other_level(frame, known));
+        // That of a DNG which tells none is 0 by the specification.
+        let told = known.filter(|known| known.uniform() != Some(0.0));
+        let other = told.and_then(|known| self.other_level(frame, known));
         let of_sensor = || {
             let level = BlackLevel::Sites(self.levels);
             of_another_sensor(frame, level, &format!("the level of its border, {:.1} ADU,", level.mean()))
