@@ -169,7 +169,7 @@ fn levels_far_from_the_bias_of_a_sensor_that_is_named_are_told() {
         let told = format!("--black {black} is far from the bias of");
         assert_eq!(said.contains(&told), is_told, "{black}: {said}");
     }
-    for (level, is_told) in [(100.0, true), (450.0, false), (520.0, false)] {
+    for (level, is_told) in [(100.0, true), (450.0, true), (495.0, false), (520.0, false)] {
         write(&shop, "dark.fits", &[], |x, y| level + 12.0 * chance(x, y, 5));
         let said = shop.said("correct-frame light.fits --sensor s.yaml --dark dark.fits -o c.exr", 0);
         assert_eq!(said.contains("ADU at least"), is_told, "{level}: {said}");

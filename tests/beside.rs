@@ -465,3 +465,130 @@ fn black_levels_that_masked_photosites_contradict_are_told() {
         assert!(!shop.said("demosaic light.fits --crop 16,0,368,32 -o out.exr", 0).contains("masked photosites"));
     }
 }
+
+/// The first 16 columns see no light and read 500 ADU beside 4500 of light: areas of masked photosites that are told wrong, or lit, are told
+/// whatever tells their level.
+#[test]
+fn borders_that_light_reaches_are_told() {
+    let shop = Workshop::new();
+    let light = |border: f64| {
+        let level = move |x: u32| if x < 16 { [border, 12.0] } else { [4500.0, 160.0] };
+        write_fits(&shop, "light.fits", SIZE, &[], |x, y| level(x)[0] + level(x)[1] * chance(x, y, 1));
+    };
+    let other = "and its metadata have a black level of 500.0 ADU; one of the two is wrong";
+    let uneven = "are uneven: their mean is";
+    for (border, area, time, wanted) in [
+        (500.0, "[0, 0, 16, 32]", "0.01", [false, false]),
+        (506.0, "[0, 0, 16, 32]", "0.01", [false, false]),
+        (600.0, "[0, 0, 16, 32]", "0.01", [true, false]),
+        // As much dark signal as black in a second, and more than all of it stays.
+        (900.0, "[0, 0, 16, 32]", "1.0", [false, false]),
+        (400.0, "[0, 0, 16, 32]", "60.0", [true, false]),
+        (0.0, "[0, 0, 16, 32]", "0.01", [true, false]),
+        (500.0, "[64, 0, 16, 32]", "1.0", [true, false]),
+        (500.0, "[0, 0, 20, 32]", "60.0", [false, true]),
+        (500.0, "[14, 0, 16, 32]", "0.01", [false, true]),
+    ] {
+        light(border);
+        let metadata = format!(
+            "schema: cyanometer/1\nquantity: adu\ncfa: rggb\nexposure_time_s: {time}\nblack_level_adu: 500\nmasked_areas: [{area}]\n"
+        );
+        fs::write(shop.path("light.fits.yaml"), metadata).unwrap();
+        for black in ["border", "rows"] {
+            let said = shop.said(&format!("correct-frame light.fits --black {black} -o out.exr"), 0);
+            assert_eq!(
+                [other, uneven].map(|text| said.contains(text)),
+                wanted,
+                "{border} {area} {time} {black}: {said}"
+            );
+            assert_eq!(said.is_empty(), wanted == [false, false], "{border} {area} {time} {black}: {said}");
+        }
+    }
+    // A sensor that is named tells its bias.
+    sensor(&shop, 0.1);
+    light(500.0);
+    for (area, is_told) in [("[0, 0, 16, 32]", false), ("[64, 0, 16, 32]", true)] {
+        let metadata = format!("schema: cyanometer/1\nquantity: adu\ncfa: rggb\nmasked_areas: [{area}]\n");
+        fs::write(shop.path("light.fits.yaml"), metadata).unwrap();
+        let said = shop.said("correct-frame light.fits --black border --sensor s.yaml -o out.exr", 0);
+        assert_eq!(said.contains("ADU, is far from the bias of s, 500 ADU"), is_told, "{said}");
+    }
+}
+
+/// A bias of 500 ADU and a dark signal of 60: a mean below 490 ADU, and a tenth of that, is none of dark frames, whatever the time and
+/// whether it is told.
+#[test]
+fn darks_below_the_bias_of_the_sensor_are_told() {
+    let shop = Workshop::new();
+    sensor(&shop, 2.0);
+    let told = "are these of another camera or converter, or was their level shifted?";
+    for (time, level, is_told) in [
+        ("0.1", -40.0, true),
+        ("0.1", 0.0, false),
+        ("0.1", -5.0, false),
+        ("30.0", -40.0, true),
+        ("30.0", 60.0, false),
+        ("", -40.0, true),
+        ("", 0.0, false),
+    ] {
+        let cards: Vec<_> = [("EXPTIME", time)].into_iter().filter(|(_, time)| !time.is_empty()).collect();
+        write(&shop, "light.fits", [4000.0, 60.0], 1, &cards);
+        write_fits(&shop, "dark.fits", SIZE, &[&[("INSTRUME", "'A'"), DARK], cards.as_slice()].concat(), |x, y| {
+            500.0 + level + 12.0 * chance(x, y, 2)
+        });
+        let said = shop.said("correct-frame light.fits --dark dark.fits --sensor s.yaml -o out.exr", 0);
+        assert_eq!(said.contains(told), is_told, "{time} {level}: {said}");
+        assert_eq!(said.is_empty(), !is_told, "{time} {level}: {said}");
+    }
+}
+
+/// One dark frame and one bias frame of a longer exposure: the complaint is of the dark frame alone.
+#[test]
+fn a_dark_frame_that_is_no_longer_than_the_bias_is_named() {
+    let shop = Workshop::new();
+    write(&shop, "light.fits", [4000.0, 60.0], 1, &[("EXPTIME", "30.0")]);
+    write(&shop, "dark.fits", [0.0, 10.0], 2, &[DARK, ("EXPTIME", "5.0")]);
+    write(&shop, "bias.fits", [0.0, 40.0], 3, &[("EXPTIME", "20.0")]);
+    let said =
+        shop.said("correct-frame light.fits --dark dark.fits --bias bias.fits --scale-dark -o out.exr", BAD_DATA);
+    assert!(said.contains("dark.fits: its exposure is no longer than that of the bias frames"), "{said}");
+    assert!(!said.contains("other"), "{said}");
+}
+
+/// A temperature in degrees Celsius is refused in the metadata of a frame as in a sensor file.
+#[test]
+fn temperatures_of_frames_in_celsius_are_refused() {
+    let shop = Workshop::new();
+    write(&shop, "light.fits", [4000.0, 60.0], 1, &[]);
+    for (told, wanted) in [("20", "293.15"), ("-20", "253.15")] {
+        let metadata = format!("schema: cyanometer/1\nquantity: adu\ncfa: rggb\nsensor_temperature_k: {told}\n");
+        fs::write(shop.path("light.fits.yaml"), metadata).unwrap();
+        for line in ["measure light.fits", "demosaic light.fits --black 500 -o out.exr"] {
+            let said = shop.said(line, BAD_DATA);
+            let text = format!(
+                "`sensor_temperature_k` is {told}; it is in K, and {told} looks like degrees Celsius, which is {wanted} K"
+            );
+            assert!(said.contains("light.fits.yaml: its ") && said.contains(&text), "{line}: {said}");
+        }
+    }
+}
+
+/// Exposures of which one is of another scale.
+#[test]
+fn frames_of_another_scale_are_not_averaged_without_a_word() {
+    let shop = Workshop::new();
+    let frame = |name: &str, scale: f64, level: f64, seed: u64| {
+        write_fits(&shop, name, SIZE, &[], |x, y| scale * (level + 60.0 * chance(x, y, seed)).round());
+    };
+    frame("a.fits", 1.0, 500.0, 1);
+    frame("b.fits", 1.0, 900.0, 2);
+    assert_eq!(shop.said("average-frames a.fits b.fits -o out.exr", 0), "");
+    frame("b.fits", 4.0, 500.0, 2);
+    for line in ["average-frames a.fits b.fits -o out.exr", "average-frames b.fits a.fits --combine median -o out.exr"]
+    {
+        let said = shop.said(line, 0);
+        assert!(said.contains("its codes are multiples of ") && said.lines().count() == 1, "{said}");
+    }
+    frame("b.fits", 1.0 / 16384.0, 500.0, 2);
+    assert!(shop.said("average-frames a.fits b.fits -o out.exr", 0).contains("are some shares of 1"));
+}

@@ -6,6 +6,12 @@ use serde::{Deserialize, Serialize};
 /// Black levels are told to a quarter: nothing of a camera reads less than this share of its bias.
 pub const LEAST_OF_BIAS: f64 = 0.75;
 
+/// How far off a black level codes without light may read, ADU: cameras tell it to such a share, and to so many ADU; a Canon Kiss X4 has 2056
+/// for 2046 to 2050.
+pub fn near_black(black_adu: f64) -> f64 {
+    (0.02 * black_adu.abs()).max(8.0)
+}
+
 /// So many times less may the dark current of a sensor be where nothing tells that it is cooled: by 60 K or so.
 pub const OF_COOLED: f64 = 1e3;
 

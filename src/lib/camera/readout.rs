@@ -11,7 +11,7 @@ const LEAST_PITCH_UM: f64 = 0.2;
 /// See [`LEAST_PITCH_UM`].
 const MOST_PITCH_UM: f64 = 300.0;
 /// The lowest temperature in K that does not look like °C: charge freezes out below.
-const LEAST_TEMPERATURE_K: f64 = 70.0;
+pub const LEAST_TEMPERATURE_K: f64 = 70.0;
 /// The largest non-uniformity of dark current that does not look like per cent.
 pub const MOST_DCNU: f64 = 2.0;
 /// The same of the response.
@@ -122,6 +122,25 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
+/// Checks the temperature of a sensor, which `key` has in K.
+///
+/// # Errors
+///
+/// What is wrong, in words: degrees Celsius, and what no sensor has.
+pub fn check_temperature(key: &str, temperature_k: f64) -> Result<(), String> {
+    const MOST_K: f64 = 1000.0;
+    if temperature_k < LEAST_TEMPERATURE_K {
+        let kelvin = kelvin(temperature_k);
+        return Err(format!(
+            "`{key}` is {temperature_k}; it is in K, and {temperature_k} looks like degrees Celsius, which is {kelvin} K"
+        ));
+    }
+    if !(..=MOST_K).contains(&temperature_k) {
+        return Err(format!("`{key}` is {temperature_k}, which is the temperature of no sensor in K"));
+    }
+    Ok(())
+}
+
 impl ReadOut {
     /// Checks that every number is possible.
     ///
@@ -218,10 +237,7 @@ impl ReadOut {
         if let Some(pitch) = self.pixel_pitch_um.filter(|pitch| *pitch > MOST_PITCH_UM) {
             return suspect("pixel_pitch_um", pitch, "um", "nm".into());
         }
-        if self.temperature_k < LEAST_TEMPERATURE_K {
-            let kelvin = kelvin(self.temperature_k);
-            return suspect("temperature_k", self.temperature_k, "K", format!("degrees Celsius, which is {kelvin} K"));
-        }
+        check_temperature("temperature_k", self.temperature_k)?;
         let patterns = [
             ("dcnu", self.dcnu, MOST_DCNU),
             ("prnu", self.prnu, MOST_PRNU),

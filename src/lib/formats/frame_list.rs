@@ -3,6 +3,7 @@
 use super::files::read_file;
 use super::{csv, delimited, keys, register, table, yaml};
 use crate::camera::optics::doubt_of_time;
+use crate::camera::readout::LEAST_TEMPERATURE_K;
 use crate::error::{Error, Result};
 use crate::names::{Named, serde_by_name};
 use serde::{Deserialize, Serialize};
@@ -71,8 +72,6 @@ pub struct FrameList {
 const COLUMNS: [&str; 7] = ["file", "kind", "exposure_s", "photons", "temperature_k", "temperature_c", "level"];
 /// 0 °C in K.
 const ZERO_CELSIUS_K: f64 = 273.15;
-/// Sensors are no colder.
-const LEAST_TEMPERATURE_K: f64 = 70.0;
 
 /// Reads a list; files are found beside it.
 ///

@@ -372,6 +372,7 @@ pub fn parse_metadata(name: &str, text: &str) -> Result<Metadata> {
     if let Some(time_s) = metadata.exposure_time_s.filter(|time_s| !(0.0..f64::INFINITY).contains(time_s)) {
         return Err(Error::format(name, format!("its `exposure_time_s` is {time_s}, which is no time")));
     }
+    metadata.check_ranges().map_err(|problem| Error::format(name, format!("its {problem}")))?;
     metadata.complete_levels().map_err(|problem| Error::format(name, problem))?;
     metadata.unknown = unknown;
     Ok(metadata)

@@ -7,6 +7,7 @@ mod difference;
 mod header;
 mod illumination;
 mod levels;
+mod ranges;
 mod records;
 
 pub use black_noise::BlackNoise;

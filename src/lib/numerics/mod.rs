@@ -15,6 +15,7 @@ pub mod robust;
 pub mod rounding;
 pub mod running;
 pub mod significance;
+pub mod steps;
 pub mod sums;
 pub mod variance_components;
 pub mod vectors;

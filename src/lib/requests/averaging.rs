@@ -1,5 +1,6 @@
 //! The average of exposures of one scene, and what stays uncertain in it.
 
+use super::frame_levels::FrameLevels;
 use super::values;
 use crate::analysis::statistics::{MarkedRows, Saturated};
 use crate::error::{Error, Result};
@@ -69,6 +70,31 @@ struct Seen {
     /// How often each pixel was saturated, and what else it was marked with.
     full: Vec<u32>,
     marks: Vec<u8>,
+    /// The first frame by its samples, and a warning of one that is not like it.
+    first: FrameLevels,
+    unlike: Option<String>,
+}
+
+impl Seen {
+    /// Counts the marks of the pixels from one on.
+    fn mark(&mut self, first: usize, marks: &[f32]) {
+        let pixels = first..first + marks.len();
+        let counts = self.full[pixels.clone()].iter_mut().zip(&mut self.marks[pixels]);
+        for ((full, marks), mark) in counts.zip(marks) {
+            let bits = bits(*mark);
+            *full += u32::from(bits & SATURATED != 0);
+            *marks |= (bits & !SATURATED).to_le_bytes()[0];
+        }
+    }
+
+    /// Compares the samples of a frame with those of the first, which it may be.
+    fn compare(&mut self, levels: FrameLevels) {
+        if self.samples.frames() < 2 {
+            self.first = levels;
+        } else if self.unlike.is_none() {
+            self.unlike = levels.doubt_beside(&self.first);
+        }
+    }
 }
 
 /// What is kept of the samples.
@@ -153,6 +179,8 @@ impl Average {
                     samples,
                     full,
                     marks,
+                    first: FrameLevels::default(),
+                    unlike: None,
                 })
             }
         };
@@ -160,7 +188,7 @@ impl Average {
             running.begin();
         }
         let step = rows.natural_rows().max(64).min(height.max(1));
-        let (mut buffer, mut band) = (Vec::new(), Vec::new());
+        let (mut buffer, mut band, mut levels) = (Vec::new(), Vec::new(), FrameLevels::of(&all.name));
         let mut y = 0;
         while y < height {
             let count = step.min(height - y);
@@ -169,21 +197,18 @@ impl Average {
             rows.read(count, &mut buffer)?;
             for (index, row) in buffer.chunks_exact(all.geometry.row_samples()).enumerate() {
                 band.extend_from_slice(&row[..kept]);
-                let Some(layer) = layer else { continue };
-                let pixels = (y + index) * width..(y + index + 1) * width;
-                let counts = seen.full[pixels.clone()].iter_mut().zip(&mut seen.marks[pixels]);
-                for ((full, marks), mark) in counts.zip(&row[layer * width..][..width]) {
-                    let bits = bits(*mark);
-                    *full += u32::from(bits & SATURATED != 0);
-                    *marks |= (bits & !SATURATED).to_le_bytes()[0];
+                if let Some(layer) = layer {
+                    seen.mark((y + index) * width, &row[layer * width..][..width]);
                 }
             }
+            levels.take(&band);
             match &mut seen.samples {
                 Samples::Mean(running) => running.add(y * kept, &band),
                 Samples::All(stack) => stack.add(&band)?,
             }
             y += count;
         }
+        seen.compare(levels);
         Ok(())
     }
 }
@@ -233,6 +258,7 @@ impl Averaged {
             };
             warnings.push(format!("{differs}; nothing is predicted of their average{colored}"));
         }
+        warnings.extend(seen.unlike.take());
         // A median is what it would be while fewer than half of its samples are full.
         let least = if averaging.combine == Combine::Median { frames.div_ceil(2) } else { 1 };
         let mut saturated = 0;

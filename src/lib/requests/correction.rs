@@ -327,7 +327,7 @@ impl Correction {
     pub fn open(&self, frame: &mut FrameHeader, input: &Input, described: &Described) -> Result<OpenCorrection> {
         let mut notes = Vec::new();
         match self.black_choice {
-            BlackChoice::Border(border) => notes.push(measure_black(frame, &input.options(), border)?),
+            BlackChoice::Border(border) => notes.extend(measure_black(frame, &input.options(), border)?),
             BlackChoice::Known(black) => notes.extend(doubt_of_black(frame, black)?),
         }
         let frame = &*frame;

@@ -1,11 +1,11 @@
 //! What came off a frame and cannot well be its dark signal, by its mean.
 
-use crate::camera::levels::{BlackLevel, LEAST_OF_BIAS, OF_COOLED};
+use crate::camera::levels::{BlackLevel, LEAST_OF_BIAS, OF_COOLED, near_black};
 use crate::camera::readout::ReadOut;
 use crate::formats::input::TOO_DARK;
 use crate::formats::register;
 use crate::metadata::{FrameHeader, MasterKind, Scene, TakenAs};
-use crate::stages::bounds::Bounds;
+use crate::stages::bounds::{Bounds, most_off_bias};
 use crate::stages::darks::{DRIFT, DarkFrames, DarkStack, Misfit};
 use crate::stages::flats::FlatFrames;
 use crate::stream::RowSource;
@@ -23,8 +23,8 @@ pub(super) struct DarkLevels {
     predicted_adu: Option<[f64; 2]>,
     /// The black level of a camera's frame.
     black_adu: Option<f64>,
-    /// What it is at least by the dark signal that the sensor predicts.
-    least_predicted_adu: Option<f64>,
+    /// What it is at least by the bias of the sensor, and by the dark signal that it predicts too.
+    least_predicted_adu: Option<[f64; 2]>,
     /// What the mean of bias frames beside dark frames can well be at most, and what tells it.
     most_bias_adu: Option<(f64, &'static str)>,
     /// Whether the exposure is so long that a dark signal may be as much as the black level.
@@ -43,7 +43,7 @@ impl DarkLevels {
             least_adu: least_level(frame, darks.is_some_and(DarkStack::is_bias)),
             most_adu: darks.and_then(|darks| most_level(frame, darks, darks.is_bias())),
             predicted_adu,
-            least_predicted_adu: predicted_adu.and_then(|predicted| least_predicted(frame, predicted)),
+            least_predicted_adu: least_predicted(frame, predicted_adu.map_or(0.0, |[_, signal]| signal)),
             most_bias_adu: darks.and_then(|darks| most_level(frame, darks, true)),
             black_adu: metadata.black_level_adu.filter(|_| metadata.adc.is_none()).map(BlackLevel::mean),
             is_long: metadata.time_s().is_some_and(|time_s| time_s >= LONG_S) && predicted_adu.is_none(),
@@ -247,6 +247,18 @@ fn dark_charge_e(readout: &ReadOut, (time_s, temperature_k): (Option<f64>, Optio
     Some(ordinary + readout.hot_pixel_share * hot)
 }
 
+/// The most dark signal that a frame of a black level can well have, ADU: ten times what its sensor predicts; of other cameras as much as the
+/// black level in [`LONG_S`], which is the time of a frame that tells none.
+pub(super) fn most_dark_signal(frame: &FrameHeader, black: f64) -> f64 {
+    let metadata = &frame.metadata;
+    let Some(readout) = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref()) else {
+        return near_black(black).max(black) * metadata.time_s().map_or(1.0, |time_s| time_s / LONG_S);
+    };
+    let conditions = (metadata.time_s().or(Some(UNTOLD_S)), metadata.temperature_k());
+    let slope = metadata.adu_per_e().unwrap_or(readout.adu_per_e);
+    TIMES * slope * dark_charge_e(readout, conditions).unwrap_or_default()
+}
+
 /// The bias of the sensor that is named, and the dark signal that it predicts of what comes off, ADU; of dark frames that do not tell
 /// their time or temperature, at those of the frame.
 fn predicted_level(frame: &FrameHeader, darks: &DarkStack) -> Option<[f64; 2]> {
@@ -263,26 +275,32 @@ fn predicted_level(frame: &FrameHeader, darks: &DarkStack) -> Option<[f64; 2]> {
     Some([metadata.bias_adu().unwrap_or(readout.bias_adu), slope * charge_e.sum::<Option<f64>>()?])
 }
 
-/// What the mean of dark frames is at least where the sensor predicts a dark signal above a bias, ADU; none of one that does not show. Where
+/// What the mean of bias frames is at least, and that of dark frames, where the sensor predicts a dark signal above its bias, ADU. Where
 /// nothing tells the temperature, the sensor may be cooled.
-fn least_predicted(frame: &FrameHeader, [bias, signal]: [f64; 2]) -> Option<f64> {
+fn least_predicted(frame: &FrameHeader, signal: f64) -> Option<[f64; 2]> {
     let metadata = &frame.metadata;
     let is_told = metadata.sensor_temperature_k.is_some() || metadata.noise.is_some();
     let readout = metadata.sensor.as_ref()?.readout.as_ref()?;
+    let bias = metadata.bias_adu().unwrap_or(readout.bias_adu);
     // A full photosite has no more.
     let slope = metadata.adu_per_e().unwrap_or(readout.adu_per_e);
     let full = 0.5 * slope * readout.full_well_e;
     let least = (signal / if is_told { TIMES } else { TIMES * OF_COOLED }).min(full);
-    let off = near(bias, readout, slope);
-    (least > off).then_some(bias - off + least)
+    let off = near(bias, readout, slope).max(most_off_bias(frame, readout)?);
+    Some([bias - off, bias - off + least])
 }
 
-/// A warning of what came off a frame and lies far below the dark signal that its sensor has.
-fn doubt_of_short(name: &str, dark: f64, least: f64) -> Option<String> {
+/// A warning of what came off a frame and lies far below the bias or the dark signal that its sensor has.
+fn doubt_of_short(name: &str, dark: f64, [of_bias, least]: [f64; 2]) -> Option<String> {
+    let question = if dark < of_bias {
+        "are these of another camera or converter, or was their level shifted?"
+    } else {
+        "are these bias frames, or of a shorter exposure, or does the camera take dark signal off itself?"
+    };
     (dark < least).then(|| {
         format!(
             "{name}: what came off has a mean of {dark:.1} ADU, and by the frame's sensor, exposure and temperature dark frames have {least:.1} \
-             ADU at least; are these bias frames, or of a shorter exposure, or does the camera take dark signal off itself?"
+             ADU at least; {question}"
         )
     })
 }
@@ -358,6 +376,9 @@ fn doubt_of_misfit(name: &str, misfit: Misfit) -> String {
         Misfit::Shifted([frame, darks]) => format!(
             "{name}: its codes are multiples of {frame}, those of what came off of {darks}, and it is brighter throughout by as many times; \
              unless these are averages their scales differ, as those of 12 bits and of 16 do"
+        ),
+        Misfit::Shares([frame, darks]) => format!(
+            "{name}: what came off reads {darks:.4} at most, by means of 64 photosites, and the frame up to {frame:.1}; is that shares of 1 beside codes?"
         ),
         Misfit::Scatters(share) => format!(
             "{name}: what came off scatters more than it in {} of it, and dark frames of its gain, scale and temperature scatter less",

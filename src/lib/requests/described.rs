@@ -2,8 +2,9 @@
 
 use super::notes::Note;
 use super::options::Input;
+use super::other_sensor::of_another_sensor;
 use super::values;
-use crate::camera::levels::{BlackLevel, BlackLevels, levels_of_bias};
+use crate::camera::levels::{BlackLevel, BlackLevels};
 use crate::camera::optics::{Exposure, doubt_of_aperture, doubt_of_time};
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
@@ -281,6 +282,7 @@ pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>>
             let known = frame.black_levels()?.filter(|known| !known.has_deltas()).map(|known| known.level());
             return Ok(known.and_then(|known| {
                 of_another_sensor(frame, known, &format!("its black level, {} ADU,", in_words(&known.sites())))
+                    .map(Note::Warning)
             }));
         }
         Black::Level(black) => black,
@@ -297,27 +299,12 @@ pub fn doubt_of_black(frame: &FrameHeader, black: Black) -> Result<Option<Note>>
             format!("{}: --black {said} is not below {LARGEST_CODE}, the largest code of 16 bits", frame.name);
         return Err(Error::Usage(problem).change(&["black"]));
     }
-    Ok(other_black(frame, black).or_else(|| of_another_sensor(frame, black, &format!("--black {said}"))))
-}
-
-/// A warning of a level to subtract from codes of a camera that is far from the bias of the sensor which is named; what it counts of dark
-/// signal is a small share of the range. `said` is what the level is called.
-fn of_another_sensor(frame: &FrameHeader, black: BlackLevel, said: &str) -> Option<Note> {
-    let metadata = &frame.metadata;
-    let are_codes = matches!(metadata.quantity, QuantityKind::Adu | QuantityKind::Unspecified);
-    if !are_codes || metadata.adc.is_some() || metadata.correction.is_some() {
-        return None;
-    }
-    let sensor = metadata.sensor.as_ref()?;
-    let readout = sensor.readout.as_ref()?;
-    let (level, bias) = (black.mean(), readout.bias_adu);
-    let [least, most] = levels_of_bias(bias, f64::from((1_u32 << readout.bits) - 1));
-    (level < least || level > most)
-        .then(|| Note::Warning(format!("{}: {said} is far from the bias of {}, {bias} ADU", frame.name, sensor.name)))
+    let other = other_black(frame, black).or_else(|| of_another_sensor(frame, black, &format!("--black {said}")));
+    Ok(other.map(Note::Warning))
 }
 
 /// A warning of a level to subtract that the metadata contradict.
-fn other_black(frame: &FrameHeader, black: BlackLevel) -> Option<Note> {
+fn other_black(frame: &FrameHeader, black: BlackLevel) -> Option<String> {
     let levels = match frame.metadata.quantity {
         QuantityKind::Electrons | QuantityKind::ExpectedElectrons => {
             frame.metadata.dark_signal_e.map(|level| [level; 4])
@@ -331,12 +318,12 @@ fn other_black(frame: &FrameHeader, black: BlackLevel) -> Option<Note> {
         BlackLevel::Sites(said) => levels.iter().zip(said).all(|(known, said)| (known - said).abs() < 1.0),
     };
     (!is_near).then(|| {
-        Note::Warning(format!(
+        format!(
             "{}: --black {} is not the black level of its metadata, {}, which --black auto takes",
             frame.name,
             in_words(&black.sites()),
             in_words(&levels)
-        ))
+        )
     })
 }
 

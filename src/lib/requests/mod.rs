@@ -19,12 +19,15 @@
 pub mod averaging;
 pub mod batch;
 pub mod border;
+mod border_doubts;
+mod border_lines;
 pub mod comparison;
 pub mod conversion;
 pub mod correction;
 mod dark_levels;
 pub mod described;
 pub mod fit;
+mod frame_levels;
 pub mod independence;
 pub mod measurement;
 pub mod options;
@@ -35,6 +38,7 @@ pub mod sensor;
 pub mod values;
 
 mod notes;
+mod other_sensor;
 mod raw_files;
 mod scene;
 

@@ -80,6 +80,17 @@ pub fn taken_off(metadata: &Metadata) -> Option<[f64; 2]> {
     Some([off.into_iter().fold(f64::INFINITY, f64::min), off.into_iter().fold(f64::NEG_INFINITY, f64::max)])
 }
 
+/// What noise takes off the mean of a frame without light at most, ADU, by its sensor and its converter, or that of the sensor; none
+/// where noise reaches the largest code.
+pub fn most_off_bias(frame: &FrameHeader, readout: &ReadOut) -> Option<f64> {
+    let adc = frame.metadata.adc.unwrap_or_else(|| AdcRecord::of_readout(readout));
+    let off = |adc: AdcRecord| Some(adc.bias_adu - least_mean(frame, readout, adc)?);
+    match readout.taps.as_ref() {
+        None => off(adc),
+        Some(taps) => (0..taps.count()).try_fold(0.0, |most: f64, tap| Some(most.max(off(adc.of_tap(taps, tap))?))),
+    }
+}
+
 /// The least mean of samples of one converter before anything came off; none where noise reaches the largest code, which cuts the
 /// mean.
 fn least_mean(frame: &FrameHeader, readout: &ReadOut, adc: AdcRecord) -> Option<f64> {

@@ -42,23 +42,36 @@ impl<S: RowSource> DefectMap<S> {
         Ok(Self::Frame(map, 0))
     }
 
-    /// A list of columns and rows on the sensor, `x,y` in each line; what follows `#` does not count, nor do names of columns in
-    /// the first line and photosites that a crop leaves out.
+    /// A list of columns and rows on the sensor, `x,y` in each line, or rows and columns where a heading says so, `row,column`, which may
+    /// stand behind `#`; what else follows `#` does not count, nor do photosites that a crop leaves out.
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] naming the line that is none.
+    /// [`Error::Format`] naming the line that is none, and for a heading that does not tell columns from rows.
     pub fn of_list(text: &str, name: &str, frame: &FrameHeader) -> Result<Self> {
         let (mut found, mut outside) = (BTreeSet::new(), BTreeSet::new());
-        let mut may_be_header = true;
-        for (number, line) in text.lines().enumerate() {
-            let line = line.split('#').next().unwrap_or_default().trim();
-            if line.is_empty() || std::mem::take(&mut may_be_header) && is_header(line) {
+        let (mut may_be_heading, mut is_by_row) = (true, false);
+        for (number, whole) in text.lines().enumerate() {
+            let line = whole.split('#').next().unwrap_or_default().trim();
+            if line.is_empty() {
+                let comment = whole.trim_start_matches([' ', '\t', '#']);
+                is_by_row = begins_with_row(comment).filter(|_| may_be_heading).unwrap_or(is_by_row);
                 continue;
             }
-            let place = line.split_once([',', ' ', '\t', ';']).and_then(|(x, y)| {
-                let [x, y] = [x, y].map(|text| text.trim().parse::<i64>());
-                Some([x.ok()?, y.ok()?])
+            if std::mem::take(&mut may_be_heading) && is_heading(line) {
+                is_by_row = begins_with_row(line).ok_or_else(|| {
+                    let problem = format!("its heading, `{line}`, does not tell columns from rows");
+                    Error::format(
+                        name,
+                        format!("{problem}; write `column,row` or `row,column`, as the numbers below are"),
+                    )
+                })?;
+                continue;
+            }
+            let place = line.split_once([',', ' ', '\t', ';']).and_then(|(first, second)| {
+                let [first, second] = [first, second].map(|text| text.trim().parse::<i64>());
+                let place = [first.ok()?, second.ok()?];
+                Some(if is_by_row { [place[1], place[0]] } else { place })
             });
             let [x, y] = place.ok_or_else(|| {
                 let number = number + 1;
@@ -148,10 +161,29 @@ impl<S: RowSource> DefectMap<S> {
     }
 }
 
-/// Whether a line names columns: words alone, as in `x,y` or `column row`.
-fn is_header(line: &str) -> bool {
-    let mut words = line.split([',', ' ', '\t', ';']).filter(|word| !word.is_empty());
-    words.all(|word| word.trim_matches('"').chars().all(|c| c.is_alphabetic() || c == '_'))
+/// The words of a line.
+fn words(line: &str) -> impl Iterator<Item = &str> {
+    line.split([',', ' ', '\t', ';']).map(|word| word.trim_matches('"')).filter(|word| !word.is_empty())
+}
+
+/// Whether a line is words alone, as in `x,y` or `column row`.
+fn is_heading(line: &str) -> bool {
+    words(line).all(|word| word.chars().all(|c| c.is_alphabetic() || c == '_'))
+}
+
+/// Whether the first of two words means rows and the second columns; none where they are not one of each.
+fn begins_with_row(line: &str) -> Option<bool> {
+    const OF_ROW: [&str; 6] = ["row", "rows", "y", "line", "lines", "y_px"];
+    const OF_COLUMN: [&str; 8] = ["column", "columns", "col", "cols", "x", "sample", "samples", "x_px"];
+    let is_row = |word: &str| {
+        let word = word.to_lowercase();
+        OF_ROW.contains(&word.as_str()).then_some(true).or(OF_COLUMN.contains(&word.as_str()).then_some(false))
+    };
+    let mut meant = words(line).map(is_row);
+    match (meant.next()??, meant.next()??, meant.next()) {
+        (first, second, None) if first != second => Some(first),
+        _ => None,
+    }
 }
 
 /// Adds bits to a mark.
@@ -387,7 +419,10 @@ impl Stage for Mend {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metadata::Metadata;
     use crate::random::gaussian::quantile;
+    use crate::stream::MemoryFrame as Plain;
+    use crate::units::QuantityKind;
 
     /// Codes of a normal variable, each of its quantiles once, so that chance plays no part: as many as chance would find lie beyond the
     /// limits, less than one in a frame, whatever the noise is beside a code and wherever its mean lies.
@@ -406,6 +441,39 @@ mod tests {
                 assert!(high - mean < 2.0 * 6.0 * f64::max(sigma, 0.25) + 2.0, "{sigma} {mean}: {high}");
             }
         }
+    }
+
+    /// Columns come first, unless a heading says that rows do.
+    #[test]
+    fn headings_of_lists_count() {
+        let geometry = Geometry::new(10, 10, &["Y"]);
+        let frame = FrameHeader { name: "f".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+        let found = |text: &str| match DefectMap::<Plain>::of_list(text, "list.txt", &frame) {
+            Ok(DefectMap::List(found, 0)) => found.into_iter().map(|[y, x]| format!("{x},{y}")).collect(),
+            Ok(_) => String::new(),
+            Err(error) => error.to_string(),
+        };
+        for heading in
+            ["", "x,y\n", "column,row\n", "# Column, Row\n", "# bad ones\n", "col row\n", "\"sample\";\"line\"\n"]
+        {
+            assert_eq!(found(&format!("{heading}5,6 # hot\n")), "5,6", "{heading}");
+        }
+        for heading in [
+            "row,column\n",
+            "y,x\n",
+            "# row column\n",
+            "# hot\n# y,x\n",
+            "line;sample\n",
+            "Row,Col\n",
+            "rows\tcolumns\n",
+        ] {
+            assert_eq!(found(&format!("{heading}6,5\n")), "5,6", "{heading}");
+        }
+        for heading in ["i,j\n", "x,x\n", "defects\n", "row,column,level\n"] {
+            assert!(found(&format!("{heading}6,5\n")).contains("does not tell columns from rows"), "{heading}");
+        }
+        // Behind a place a comment is none.
+        assert_eq!(found("5,6\n# row,column\n"), "5,6");
     }
 
     /// Most of a class at code 0, where its mean lies below: those above tell how far the others would lie.

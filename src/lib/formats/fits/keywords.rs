@@ -2,6 +2,7 @@
 
 use super::header::{Header, whole};
 use super::units::{LENGTH, TEMPERATURE, TIME, number_of};
+use crate::camera::readout::LEAST_TEMPERATURE_K;
 use crate::cfa::FilterArray;
 use crate::formats::exposure::{self, ToldExposure};
 use crate::metadata::{CameraSettings, Metadata, TakenAs};
@@ -16,7 +17,7 @@ const SAME_NUMBER: f64 = 1e-3;
 const SAME_APERTURE: f64 = 0.03;
 
 /// Temperatures that sensors have; programs write others where they know none.
-const SENSOR_K: RangeInclusive<f64> = 50.0..=400.0;
+const SENSOR_K: RangeInclusive<f64> = LEAST_TEMPERATURE_K..=400.0;
 
 /// What a header tells.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! Photosites that no light reaches, beside the black level that comes off: the two tell the same.
 
-use crate::camera::levels::BlackLevels;
+use crate::camera::levels::{BlackLevels, near_black};
 use crate::formats::register;
 use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
@@ -11,8 +11,6 @@ use crate::units::QuantityKind;
 const OF_ROW: usize = 64;
 /// Fewer of a frame tell nothing.
 const LEAST: usize = 64;
-/// Cameras tell black levels to such a share, and to so many ADU: a Canon Kiss X4 has 2056 for 2046 to 2050.
-const NEAR: [f64; 2] = [0.02, 8.0];
 /// Standard deviations by which a median may be off, all of which may be those of whole rows.
 const Z: f64 = 8.0;
 
@@ -73,7 +71,7 @@ impl MaskedCheck {
         let level = self.level / count as f64;
         // Between the quartiles of a normal law lie 1.35 standard deviations; of few codes they may be one.
         let scatter = (high - low).max(1.0) / 1.349;
-        let allowed = (NEAR[0] * level.abs()).max(NEAR[1]) + Z * scatter / (self.rows as f64).sqrt();
+        let allowed = near_black(level) + Z * scatter / (self.rows as f64).sqrt();
         (off.abs() > allowed).then_some([level + off, level])
     }
 

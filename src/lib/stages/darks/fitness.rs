@@ -4,6 +4,8 @@
 //! scatter more, and where its codes are multiples of some step, so are those of the frame. Means and scatters are those of stretches of
 //! the even or the odd columns of a row, in one row pair of [`PAIRS`].
 
+use crate::numerics::steps::Steps;
+
 /// Samples of a stretch.
 const STRETCH: usize = 64;
 /// One pair of rows in so many is looked at.
@@ -18,51 +20,6 @@ const SCATTER: f64 = 0.6;
 const LEAST_SCATTER: f64 = 1.1;
 /// The share of a stretch of the frame at its largest value from which it is cut off there.
 const CUT: usize = 8;
-/// Codes that differ by so many steps tell the step.
-const TELLING: i64 = 16;
-
-/// The step of whole numbers: the largest power of two that all differences are multiples of.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Steps {
-    range: Option<[i64; 2]>,
-    bits: u64,
-    has_others: bool,
-}
-
-impl Steps {
-    pub fn take(&mut self, samples: impl Iterator<Item = f64>) {
-        for sample in samples {
-            let whole = sample.round();
-            if (sample - whole).abs() > 1e-3 || whole.abs() > 1e15 {
-                self.has_others |= sample.is_finite();
-                continue;
-            }
-            #[expect(clippy::cast_possible_truncation, reason = "not beyond 10¹⁵")]
-            let whole = whole as i64;
-            let [low, high] = self.range.unwrap_or([whole; 2]);
-            self.bits |= whole.abs_diff(low);
-            self.range = Some([low.min(whole), high.max(whole)]);
-        }
-    }
-
-    /// The step, however few the numbers are; 1 where some are not whole.
-    pub fn least(&self) -> f64 {
-        if self.bits == 0 || self.has_others { 1.0 } else { f64::from(self.bits.trailing_zeros()).exp2() }
-    }
-
-    /// Whether it is 1 whatever more numbers are.
-    pub fn is_one(&self) -> bool {
-        self.has_others || self.bits & 1 == 1
-    }
-
-    /// The step; none of few numbers, and where some are not whole.
-    fn step(&self) -> Option<u64> {
-        let [low, high] = self.range?;
-        let step = 1_u64 << self.bits.trailing_zeros().min(32);
-        let is_told = high.abs_diff(low) >= step.saturating_mul(TELLING.unsigned_abs());
-        (is_told && !self.has_others).then_some(step)
-    }
-}
 
 /// What was seen of a frame and of what came off it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -80,6 +37,8 @@ pub struct Fitness {
     scatter: f64,
     /// The least of the means of stretches of the frame as multiples of what neighbors in them differ by.
     nearest: Option<f64>,
+    /// The largest of the means of stretches of the frame, and of the darks.
+    largest: [f64; 2],
     /// Whether some samples of the frame are no whole numbers.
     pub(super) is_fractional: bool,
 }
@@ -95,6 +54,8 @@ pub enum Misfit {
     Shifted([u64; 2]),
     /// In such a share of the frame it scatters more.
     Scatters(f64),
+    /// It is shares of 1, and the frame is codes; the largest means of both.
+    Shares([f64; 2]),
 }
 
 impl Fitness {
@@ -134,6 +95,7 @@ impl Fitness {
         let ratio = if b > 0.0 { a / b } else { 0.0 };
         self.least_ratio = Some(self.least_ratio.map_or(ratio, |least| least.min(ratio)));
         self.scatter += of_darks;
+        self.largest = [self.largest[0].max(a), self.largest[1].max(b)];
         let above_zero = if a > 0.0 { a / of_frame } else { 0.0 };
         self.nearest = Some(self.nearest.map_or(above_zero, |nearest| nearest.min(above_zero)));
         self.is_fractional |= frame.iter().any(|sample| sample.fract() != 0.0);
@@ -164,8 +126,7 @@ impl Fitness {
 
     /// Whether codes of the darks lie multiples of a power of two apart, however few they are.
     pub(super) fn are_darks_multiples_of(&self, scale: u64) -> bool {
-        let [_, Steps { bits, has_others, .. }] = self.steps;
-        bits != 0 && !has_others && bits.trailing_zeros() >= scale.trailing_zeros()
+        self.steps[1].are_multiples_of(scale)
     }
 
     /// Whether codes of the frame may be those of the darks times a step: then all of it is above its bias, so many times that of the darks.
@@ -181,6 +142,19 @@ impl Fitness {
         frame >= LEAST * darks
             && self.least_ratio.is_some_and(|least| least >= OF_STEP * step)
             && self.scatter < OF_SCATTER * frame as f64 * self.stretches as f64
+    }
+
+    /// Whether the darks may be shares of 1 beside codes: they are no whole numbers, below 1, and scatter by less than averages of codes about so
+    /// little do, while the frame is far above 1.
+    fn are_shares(&self) -> bool {
+        /// Means of 10⁴ codes scatter by as much.
+        const SCATTER_OF_CODES: f64 = 0.01;
+        /// Light of codes is brighter.
+        const CODES: f64 = 16.0;
+        let [of_frame, of_darks] = self.largest;
+        let scatter = self.scatter / self.stretches.max(1) as f64;
+        let is_small = of_darks > 0.0 && of_darks < 1.0 && scatter < SCATTER_OF_CODES;
+        is_small && of_frame > CODES && self.steps[1].has_fractions()
     }
 
     /// Why what came off cannot well be dark frames of the frame; none where nothing speaks against it.
@@ -199,6 +173,7 @@ impl Fitness {
         match steps.filter(|(frame, darks)| darks > frame || self.is_shifted(*frame, *darks)) {
             Some((frame, darks)) if darks > frame => Some(Misfit::Step([frame, darks])),
             Some((frame, darks)) => Some(Misfit::Shifted([frame, darks])),
+            None if self.stretches >= LEAST && self.are_shares() => Some(Misfit::Shares(self.largest)),
             None if below >= SPOT && self.below >= LEAST => Some(Misfit::Below(below)),
             None if scatters >= SPOTS && self.scattering[1] >= LEAST => Some(Misfit::Scatters(scatters)),
             None => None,
@@ -273,6 +248,26 @@ mod tests {
         let found = seen([0.0, 3000.0], 4.01, 1.0).misfit();
         assert!(matches!(found, Some(Misfit::Below(share)) if (0.3..0.5).contains(&share)), "{found:?}");
         assert_eq!(seen([1500.0, 3000.0], 4.01, 1.0).misfit(), None);
+    }
+
+    #[test]
+    fn shares_of_one_beside_codes_are_told() {
+        for (scale, is_told) in [(1.0 / 16_383.0, true), (1.0 / 65_535.0, true), (1.0 / 255.0, false), (1.0, false)] {
+            let mut fitness = Fitness::default();
+            for row in 0..16_i32 {
+                let light = normals(0, row).into_iter().map(|z| crate::frame::to_sample((2000.0 + 30.0 * z).round()));
+                let dark: Vec<f64> = normals(1, row).into_iter().map(|z| scale * (400.0 + 3.0 * z).round()).collect();
+                fitness.take(&light.collect::<Vec<_>>(), &dark, Some(1.0));
+            }
+            assert_eq!(matches!(fitness.misfit(), Some(Misfit::Shares(_))), is_told, "{scale}");
+        }
+        // Codes of a camera of no black that are hardly ever 1.
+        let mut fitness = Fitness::default();
+        for row in 0..16_i32 {
+            let dark: Vec<f64> = (0..2048).map(|x| f64::from(u8::from(x % 700 == row))).collect();
+            fitness.take(&[2000.0; 2048], &dark, Some(1.0));
+        }
+        assert_eq!(fitness.misfit(), None);
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! Dark frames that are read in step with the frame that they come off.
 
-use super::fitness::{Fitness, Misfit, Steps};
+use super::fitness::{Fitness, Misfit};
 use super::stack::{DarkSettings, DarkStack, Master};
 use crate::error::Result;
 use crate::frame::to_sample;
 use crate::metadata::{FrameHeader, MasterKind};
 use crate::numerics::averages::Combine;
+use crate::numerics::steps::Steps;
 use crate::numerics::vectors::{self, Kernel};
 use crate::stages::defects::{Survey, add};
 use crate::stages::masters::{Averaging, Frames};

@@ -211,7 +211,8 @@ impl DarkStack {
                     None => 0.0,
                 };
                 if nearest.dose <= of_bias {
-                    return Err(stack.head.refuse("its exposure is no longer than that of the bias frames"));
+                    let dark = darks[nearest.members[0]];
+                    return Err(dark.refuse("its exposure is no longer than that of the bias frames"));
                 }
                 let scale = (wanted - of_bias) / (nearest.dose - of_bias);
                 masters[0].record.weight = scale;
