@@ -51,7 +51,11 @@ pub(super) fn relative_matrix(
     image: &RawImage,
     notes: &mut Vec<String>,
 ) -> Result<Option<RelativeMatrix>> {
-    if image.is_monochrome || !tags::COLOR_MATRICES[0].is_in(&image.first) {
+    if image.is_monochrome {
+        return Ok(None);
+    }
+    if !tags::COLOR_MATRICES[0].is_in(&image.first) {
+        notes.extend(astray(image).map(|why| format!("its color matrix is passed over: {why}")));
         return Ok(None);
     }
     let found = match found(file, image) {
@@ -78,9 +82,28 @@ fn found(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Re
     }
     let light = match light(file, image)? {
         Ok(light) => light,
-        Err(why) => return Ok(Err(why)),
+        Err(why) => {
+            // What else may be wrong with them shows in any light.
+            let others = mapped(file, image, Light::White(color::D65_XY), "d65", OwnMatrix::Color)?;
+            let advice =
+                "`fit-matrix --from-raw FILE.dng --illuminant d65 -o m.yaml` makes one for a light that is named";
+            return Ok(Err(others.map_or_else(|problem| problem, |_| format!("{why}; {advice}"))));
+        }
     };
     mapped(file, image, light, "the white of the exposure", OwnMatrix::Color)
+}
+
+/// Why color matrices do not count that are there without ColorMatrix1 where it belongs.
+fn astray(image: &RawImage) -> Option<&'static str> {
+    let [first, second] = tags::COLOR_MATRICES;
+    let all = [first, second, tags::COLOR_MATRIX_3];
+    if all.iter().any(|tag| tag.is_in(&image.first)) {
+        Some("ColorMatrix1 is missing")
+    } else if all.iter().any(|tag| tag.is_in(image.directory())) {
+        Some("it stands in the directory of the samples, and counts in the first alone")
+    } else {
+        None
+    }
 }
 
 /// Which of the matrices of a DNG.
@@ -113,8 +136,12 @@ pub fn own_matrix(path: &Path, light_named: Option<([f64; 2], String)>, which: O
     let (file, name) = open_named(Some(path))?;
     let mut file = TiffFile::open(file, &name)?;
     let image = RawImage::find(&mut file)?;
-    if image.is_monochrome || !tags::COLOR_MATRICES[0].is_in(&image.first) {
-        return Err(Error::format(&name, "it tells no color matrix (ColorMatrix1)"));
+    if image.is_monochrome {
+        return Err(Error::format(&name, "it is monochrome, and has no colors"));
+    }
+    if !tags::COLOR_MATRICES[0].is_in(&image.first) {
+        let why = astray(&image).map_or_else(String::new, |why| format!(": {why}"));
+        return Err(Error::format(&name, format!("it tells no color matrix (ColorMatrix1){why}")));
     }
     let (light, named) = match light_named {
         Some((xy, named)) => (Ok(Light::White(xy)), named),
