@@ -74,8 +74,10 @@ mod tests {
         for order in [[1, 0, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]] {
             assert!(told(order, 1e-4).is_some(), "{order:?}");
         }
-        // Of noise as large as the signals nothing follows.
-        assert_eq!(told([2, 1, 0], 0.2), None);
+        // Of a matrix that is as uncertain as it is large nothing follows.
+        let mut unsure = found([2, 1, 0], 1e-4);
+        unsure.covariance *= 1e8;
+        assert_eq!(out_of_order(&unsure, &observer).unwrap(), None);
     }
 
     /// What all elements are multiplied with, the scale of the signals, does not count.

@@ -216,7 +216,19 @@ impl ChartReader {
         let at_places = vec![[(0.0, 0); 4]; PATCHES];
         let origin = frame.geometry.origin;
         let above = std::array::from_fn(|_| vec![None; width]);
-        Ok(Self { grid, pattern, origin, black, full: full.classes(), range, width, next_row: 0, sums, at_places, above })
+        Ok(Self {
+            grid,
+            pattern,
+            origin,
+            black,
+            full: full.classes(),
+            range,
+            width,
+            next_row: 0,
+            sums,
+            at_places,
+            above,
+        })
     }
 
     /// White level less black level of the frame, ADU, of which signals are shares.

@@ -68,12 +68,7 @@ impl Expected {
     }
 
     /// Those of reflectances.
-    fn of_curves(
-        reference: &Reference,
-        curves: &[Curve],
-        light: Option<Light>,
-        observer: &Observer,
-    ) -> Result<Self> {
+    fn of_curves(reference: &Reference, curves: &[Curve], light: Option<Light>, observer: &Observer) -> Result<Self> {
         let Some(light) = light else {
             let problem = format!("{}: reflectances have a color in a light alone", reference.name);
             return Err(Error::Usage(problem).give(&["illuminant"]));
@@ -119,10 +114,14 @@ fn doubt_of_light(
     let text = match (&reference.colors, known) {
         (Colors::Lab(_), _) => format!("{lie}, which is not neutral about {name}, the white of its L*a*b*"),
         (_, Some((light, _))) => {
-            format!("{lie}, as in {light}, not in {name}, which its colors are taken to be for: give --reference-light {light}")
+            format!(
+                "{lie}, as in {light}, not in {name}, which its colors are taken to be for: give --reference-light {light}"
+            )
         }
         (_, None) => {
-            format!("{lie}, not at {name}, which its colors are taken to be for: give the light that they are for, --reference-light {x},{y}")
+            format!(
+                "{lie}, not at {name}, which its colors are taken to be for: give the light that they are for, --reference-light {x},{y}"
+            )
         }
     };
     Some(Note::Warning(text))

@@ -9,8 +9,6 @@ use super::super::notes::Note;
 use super::super::options::Selection;
 use super::super::values;
 use super::exposure::ChartExposure;
-use expected::Expected;
-use seen::{Seen, Turned, see_frame, see_table};
 use crate::analysis::characterization::regression::residuals;
 use crate::analysis::characterization::{
     CameraMatrix, ChartRecord, MATRIX_UNIT, MatrixUncertainty, RELATIVE_MATRIX_UNIT, Signals, Training,
@@ -26,7 +24,9 @@ use crate::formats::data;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::requests::values::LightColor;
 use clap::Args;
+use expected::Expected;
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use seen::{Seen, Turned, see_frame, see_table};
 use std::path::{Path, PathBuf};
 
 /// Share of white by which the references of a chart and what no matrix does are never off.
