@@ -194,7 +194,7 @@ fn what_is_typed_wrong_is_told_what_it_may_be() {
         (
             "preview codes.exr noisy.exr --caption -o a.png",
             BAD_USAGE,
-            "the frames of a sheet have captions, which say what each is; leave out --caption=TEXT",
+            "the frames of a sheet have captions, which say what each is; leave out --caption",
         ),
     ] {
         let said = shop.said(line, status);

@@ -328,8 +328,8 @@ fn a_raw_brings_its_matrix_along() {
         (
             "to-xyz none.exr -o x.exr",
             BAD_USAGE,
-            "to-xyz: none.exr: neither its sensor nor its raw file tells a matrix; of a DNG with a ColorMatrix1 and no white of its \
-             exposure (AsShotNeutral) `fit-matrix --from-raw FILE.dng --illuminant d65 -o m.yaml` makes one; give --matrix\n",
+            "to-xyz: none.exr: neither its sensor nor its raw file tells a matrix; of a DNG `import-raw FILE.dng -v` tells what its matrix \
+             lacks, and what makes one; give --matrix\n",
         ),
         (
             "import-raw raw.dng -o x.exr --write-matrix x.yaml",

@@ -433,6 +433,123 @@ fn a_chart_tells_its_levels_and_corners() {
     }
 }
 
+/// Writes a table of three columns of named patches.
+fn table(shop: &Workshop, name: &str, columns: &str, rows: &[(String, Vector3<f64>)]) {
+    let row = |(name, [a, b, c]): &(String, [f64; 3])| format!("{name},{a},{b},{c}\n");
+    let rows = rows.iter().map(|(name, values)| row(&(name.clone(), (*values).into())));
+    fs::write(shop.path(name), format!("name,{columns}\n{}", rows.collect::<String>())).unwrap();
+}
+
+/// The patches of a ColorChecker under D50, and what a camera reads of them.
+fn colors_and_signals() -> [Vec<(String, Vector3<f64>)>; 2] {
+    let reference = load_reference("colorchecker").unwrap();
+    let colors = reference.colors_in([0.9642, 1.0, 0.8249]).unwrap();
+    let named = |of: &dyn Fn(Vector3<f64>) -> Vector3<f64>| {
+        reference.names.iter().cloned().zip(colors.iter().map(|xyz| of(Vector3::from(*xyz)))).collect()
+    };
+    let camera_from_xyz = Matrix3::new(1.5, 0.25, 0.08, 0.58, 1.42, -0.33, 0.03, -0.25, 2.33).try_inverse().unwrap();
+    [named(&|xyz| xyz), named(&|xyz| camera_from_xyz * xyz)]
+}
+
+/// Colors whose neutral patches are those of another light are told, with the name of the light where it has one, and their neutral patches
+/// tell a black level all the same.
+#[test]
+fn a_reference_for_another_light_is_told() {
+    let shop = Workshop::new();
+    let [colors, signals] = colors_and_signals();
+    table(&shop, "signals.csv", "R,G,B", &signals);
+    let above: Vec<_> = signals.iter().map(|(name, signal)| (name.clone(), signal.add_scalar(0.02))).collect();
+    table(&shop, "above.csv", "R,G,B", &above);
+    // White by white, as von Kries has it: neutral patches go where the white goes.
+    for (name, white) in [("d50", [0.9642, 0.8249]), ("d65", [0.9505, 1.0889]), ("c", [0.9807, 1.1823])] {
+        let gains = Vector3::new(white[0] / 0.9642, 1.0, white[1] / 0.8249);
+        let rows: Vec<_> = colors.iter().map(|(name, xyz)| (name.clone(), xyz.component_mul(&gains))).collect();
+        table(&shop, &format!("{name}.csv"), "X,Y,Z", &rows);
+    }
+    let said = |patches: &str, more: &str| {
+        shop.said(&format!("fit-matrix --patches {patches}.csv --reference {more} -o m.yaml"), 0)
+    };
+    for honest in ["d50.csv", "d65.csv --reference-light d65", "c.csv --reference-light 0.3101,0.3162"] {
+        assert_eq!(said("signals", honest), "", "{honest}");
+    }
+    let told = said("signals", "d65.csv");
+    assert!(told.starts_with("fit-matrix: warning: d65.csv: its neutral patches lie at x 0.31"), "{told}");
+    let end = ", as in d65, not in d50, which its colors are taken to be for: give --reference-light d65\n";
+    assert!(told.ends_with(end) && told.lines().count() == 1, "{told}");
+    assert!(said("signals", "d50.csv --reference-light d65").contains("as in d50, not in d65"));
+    assert!(said("signals", "c.csv").contains("give the light that they are for, --reference-light 0.31"));
+    for light in ["d50.csv", "d65.csv"] {
+        assert!(
+            said("above", light).contains("its neutral patches are not in proportion to their luminance"),
+            "{light}"
+        );
+    }
+}
+
+/// Red and blue that are exchanged, by columns of a table or by the pattern of a frame, fit as well; the matrix tells. Patterns whose greens are
+/// red and blue are refused, and so is a table whose classes differ by noise alone.
+#[test]
+fn classes_that_are_exchanged_are_told() {
+    let shop = Workshop::new();
+    let [_, signals] = colors_and_signals();
+    let exchanged: Vec<_> =
+        signals.iter().map(|(name, signal)| (name.clone(), Vector3::new(signal[2], signal[1], signal[0]))).collect();
+    table(&shop, "bgr.csv", "R,G,B", &exchanged);
+    let told = shop.said("fit-matrix --patches bgr.csv -o m.yaml", 0);
+    let begin = "fit-matrix: warning: bgr.csv: by the matrix the mean wavelengths of R, G and B are 4";
+    let end = " nm, which is not the order of their names; check the columns R, G and B\n";
+    assert!(told.starts_with(begin) && told.ends_with(end), "{told}");
+    chart(&shop);
+    let metadata = "schema: cyanometer/1\nquantity: adu\nblack_level_adu: 100\nwhite_level_adu: 4100\n";
+    fs::write(shop.path("bare.yaml"), metadata).unwrap();
+    let fit = "fit-matrix --chart chart.exr --metadata bare.yaml --corners 20,20,220,20,220,140,20,140 -o m.yaml --cfa";
+    assert_eq!(shop.said(&format!("{fit} rggb"), 0), "");
+    let told = shop.said(&format!("{fit} bggr"), 0);
+    assert!(
+        told.ends_with("which is not the order of their names; check the pattern of the filters, --cfa\n"),
+        "{told}"
+    );
+    fs::remove_file(shop.path("m.yaml")).unwrap();
+    for pattern in ["grbg", "gbrg"] {
+        let told = shop.said(&format!("{fit} {pattern}"), BAD_DATA);
+        let begin =
+            format!("fit-matrix: chart.exr: of the patches of the chart the two greens of {pattern} differ by ");
+        assert!(told.starts_with(&begin) && told.ends_with(": is the pattern rggb or bggr?\n"), "{told}");
+    }
+    let rows = signals.iter().enumerate().map(|(index, (name, signal))| {
+        let noise = 1e-4 * [1.0, -1.0, 0.5][index % 3];
+        format!("{name},{},{},{},1e-4,1e-4,1e-4\n", signal[0] + noise, signal[1], signal[0] - noise)
+    });
+    let text = format!("name,R,G,B,std_R,std_G,std_B\n{}", rows.collect::<String>());
+    fs::write(shop.path("two.csv"), text).unwrap();
+    assert!(shop.said("fit-matrix --patches two.csv -o m.yaml", BAD_DATA).contains("do not determine the matrix"));
+    assert!(!shop.path("m.yaml").exists());
+}
+
+/// Names that are exchanged are told with what they would be off by; a patch that is dirty with how far it is off.
+#[test]
+fn patches_that_lie_far_from_the_fit_are_named() {
+    let shop = Workshop::new();
+    let [_, signals] = colors_and_signals();
+    let said = |rows: &[(String, Vector3<f64>)]| {
+        table(&shop, "signals.csv", "R,G,B", rows);
+        shop.said("fit-matrix --patches signals.csv -o m.yaml", 0)
+    };
+    assert_eq!(said(&signals), "");
+    let mut exchanged = signals.clone();
+    (exchanged[3].0, exchanged[13].0) = (signals[13].0.clone(), signals[3].0.clone());
+    let told = said(&exchanged);
+    assert!(told.starts_with("fit-matrix: warning: signals.csv: "), "{told}");
+    assert!(
+        ["foliage ", "green ", "off: are their names exchanged?\n"].iter().all(|words| told.contains(words)),
+        "{told}"
+    );
+    let mut dirty = signals.clone();
+    dirty[9].1 *= 0.3;
+    let told = said(&dirty);
+    assert!(told.contains("far off are purple ") && told.lines().count() == 1, "{told}");
+}
+
 /// A matrix keeps what it was fitted to: sensitivity, for absolute XYZ, and the range between black and white.
 #[test]
 fn codes_unlike_those_of_the_chart_are_told() {

@@ -14,6 +14,13 @@ use std::fmt;
 /// Wavelengths that are all shorter than this, in nm, look like micrometers: no sensor behind a lens sees them.
 pub const SHORTEST_NM: f64 = 100.0;
 
+/// Says that the mean wavelengths of R, G and B, nm, are not in the order of their names.
+pub fn not_in_order([red, green, blue]: [f64; 3]) -> String {
+    format!(
+        "the mean wavelengths of R, G and B are {red:.0}, {green:.0} and {blue:.0} nm, which is not the order of their names"
+    )
+}
+
 /// An even grid of wavelengths, and the rule that sums over it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WavelengthGrid {

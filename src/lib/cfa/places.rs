@@ -2,7 +2,7 @@
 //!
 //! A Bayer pattern has its greens on one diagonal of each 2×2, and they make the same of the same light but for a few per cent; red and
 //! blue, on the other, are equal by chance alone. Of an array that is taken for the one beside it the greens differ, and red and blue do not.
-//! Red that is taken for blue shows in no flat of unknown light.
+//! Red that is taken for blue shows in no flat of unknown light. Patches of many colors tell the same.
 
 use super::{CfaPattern, FilterArray};
 
@@ -51,6 +51,39 @@ impl Places {
         })
     }
 
+    /// What is wrong with a Bayer pattern, where photosites saw lights of several colors and the other diagonal has the greens: those are
+    /// then alike in all of them, which red and blue are not.
+    pub fn doubt_in_colors(colors: &[Self], said: CfaPattern) -> Option<String> {
+        let ([others, greens], [a, b]) = Self::diagonals(said);
+        // Squares as shares of the brightest place, and in units of what chance makes of them.
+        let of = |places: [usize; 2]| {
+            let squares = colors.iter().map(|color| {
+                let brightest = color.signal.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let unlike = color.unlike(places).powi(2);
+                [unlike / brightest.powi(2), unlike / (color.variance[places[0]] + color.variance[places[1]])]
+            });
+            squares.fold([0.0; 2], |[shares, chances], [share, chance]| [shares + share, chances + chance])
+        };
+        let count = colors.len() as f64;
+        let ([of_greens, chances], [of_others, _]) = (of(greens), of(others));
+        let [of_greens, of_others] = [of_greens, of_others].map(|sum| (sum / count).sqrt());
+        let is_wrong = of_greens > OF_GREENS && of_others <= ALIKE * of_greens;
+        (is_wrong && chances > count + BEYOND * (2.0 * count).sqrt()).then(|| {
+            format!(
+                "the two greens of {said} differ by {:.1} % of the brightest class, rms, and red and blue by {:.1} %: is the pattern {a} or {b}?",
+                100.0 * of_greens,
+                100.0 * of_others
+            )
+        })
+    }
+
+    /// The diagonals of red and blue and of the greens of a pattern, and the patterns that have their greens on the former.
+    fn diagonals(said: CfaPattern) -> ([[usize; 2]; 2], [CfaPattern; 2]) {
+        let [(others, patterns), (greens, _)] =
+            if DIAGONALS[0].1.contains(&said) { [DIAGONALS[1], DIAGONALS[0]] } else { DIAGONALS };
+        ([others, greens], patterns)
+    }
+
     fn unlike(&self, [one, other]: [usize; 2]) -> f64 {
         (self.signal[one] - self.signal[other]).abs()
     }
@@ -60,8 +93,7 @@ impl Places {
     }
 
     fn doubt_of_bayer(&self, said: CfaPattern, brightest: f64) -> Option<String> {
-        let [(others, [a, b]), (greens, _)] =
-            if DIAGONALS[0].1.contains(&said) { [DIAGONALS[1], DIAGONALS[0]] } else { DIAGONALS };
+        let ([others, greens], [a, b]) = Self::diagonals(said);
         let [of_greens, of_others] = [greens, others].map(|places| self.unlike(places));
         let is_wrong = of_greens > OF_GREENS * brightest && of_others <= ALIKE * of_greens;
         (is_wrong && self.is_beyond_chance(greens)).then(|| {
@@ -164,5 +196,29 @@ mod tests {
         ] {
             assert_eq!(doubt(array, signal), None, "{array} {signal:?}");
         }
+    }
+
+    /// Patches of many colors tell a pattern from those with their greens on the other diagonal, whatever red and blue are in each; greens
+    /// that differ a little, patches of one color, in which red and blue are alike, and no light do not.
+    #[test]
+    fn colors_tell_the_pattern() {
+        let colors = [[500.0, 300.0, 100.0], [100.0, 300.0, 500.0], [400.0, 400.0, 400.0], [100.0, 200.0, 120.0]];
+        let rggb = colors.map(|[r, g, b]| Places { signal: [r, g, 1.02 * g, b], variance: [1.0; 4] });
+        let doubt = |colors: &[Places], said: &str| {
+            let Ok(FilterArray::Bayer(pattern)) = said.parse() else { return None };
+            Places::doubt_in_colors(colors, pattern)
+        };
+        for said in ["grbg", "gbrg"] {
+            let told = doubt(&rggb, said).unwrap();
+            let end = "and red and blue by 1.6 %: is the pattern rggb or bggr?";
+            assert!(
+                told.starts_with(&format!("the two greens of {said} differ by 56.8 % of")) && told.ends_with(end),
+                "{told}"
+            );
+            assert_eq!(doubt(&rggb[2..3], said), None);
+        }
+        assert_eq!([doubt(&rggb, "rggb"), doubt(&rggb, "bggr"), doubt(&[], "grbg")], [None, None, None]);
+        let dark = rggb.map(|place| Places { variance: [1e6; 4], ..place });
+        assert_eq!(doubt(&dark, "grbg"), None);
     }
 }

@@ -1,6 +1,6 @@
 //! What to do about an error, in the options of the program that met it.
 
-use crate::error::Error;
+use crate::error::{Advice, Error};
 use crate::formats::data::spectrum_file;
 use crate::formats::files::near_file;
 use clap::Command;
@@ -37,7 +37,15 @@ pub(super) fn advised(error: &Error, command: &Command) -> String {
             None => error.to_string(),
         },
         Error::Advised { error, advice } => {
-            format!("{}; {}", advised(error, command), advice.in_words(|setting| option(setting, command)))
+            format!(
+                "{}; {}",
+                advised(error, command),
+                advice.in_words(|setting| match advice {
+                    // Whether the option stands there with a value or without.
+                    Advice::LeaveOut(_) => long(setting),
+                    Advice::Give(_) | Advice::Change(_) => option(setting, command),
+                })
+            )
         }
         Error::Disk { file, action: "open", source } if source.kind() == io::ErrorKind::NotFound => {
             let words: Vec<OsString> = std::env::args_os().skip(1).collect();
@@ -110,12 +118,17 @@ fn has(option: &str, command: &Command) -> bool {
 /// A setting as the command line calls it: `white_luminance` is `--white-luminance`; an option whose value must follow an
 /// equals sign is shown with it.
 fn option(setting: &str, command: &Command) -> String {
-    let long = setting.replace('_', "-");
-    let argument = command.get_arguments().find(|argument| argument.get_long() == Some(&long));
+    let long = long(setting);
+    let argument = command.get_arguments().find(|argument| argument.get_long() == long.strip_prefix("--"));
     match argument.filter(|argument| argument.is_require_equals_set()).and_then(|argument| argument.get_value_names()) {
-        Some([value, ..]) => format!("--{long}={value}"),
-        _ => format!("--{long}"),
+        Some([value, ..]) => format!("{long}={value}"),
+        _ => long,
     }
+}
+
+/// The name of the option of a setting.
+fn long(setting: &str) -> String {
+    format!("--{}", setting.replace('_', "-"))
 }
 
 #[cfg(test)]
@@ -185,6 +198,7 @@ mod tests {
         let said = |error: Error| advised(&error, &command);
         assert_eq!(said(wrong().give(&["black", "dark", "cte"])), "it is wrong; give --black, --dark or --cte");
         assert_eq!(said(wrong().give(&["patches"])), "it is wrong; give --patches=WxH");
+        assert_eq!(said(wrong().leave_out(&["patches"])), "it is wrong; leave out --patches");
         let both = wrong().leave_out(&["black", "white_luminance"]);
         assert_eq!(both.to_string(), "it is wrong; leave out `black` and `white_luminance`");
         assert_eq!(both.exit_status(), 2);

@@ -110,7 +110,11 @@ impl Calibration {
     /// Camera from XYZ for a white, AB · CC · CM: CM and CC are linear in the reciprocal of its correlated color temperature
     /// between those of the illuminants, and constant beyond.
     pub fn camera_from_xyz(&self, observer: &Observer, white_xy: [f64; 2]) -> Matrix3<f64> {
-        let share = self.share_of_first(observer, white_xy);
+        self.at_share(self.share_of_first(observer, white_xy))
+    }
+
+    /// The same by the share of the first illuminant.
+    fn at_share(&self, share: f64) -> Matrix3<f64> {
         let analog_balance = Matrix3::from_diagonal(&Vector3::from(self.analog_balance));
         analog_balance * self.mixed(share, |set| set.camera_calibration) * self.mixed(share, |set| set.color_matrix)
     }
@@ -126,23 +130,53 @@ impl Calibration {
     }
 
     /// The chromaticity whose signals are in proportion to `neutral`: the matrix depends on it, so that it is guessed, from D50
-    /// on, until it stays. Where it goes to and fro the last two are averaged.
+    /// on, until it stays, or, where it goes to and fro, sought between the last two.
     fn white_of(&self, observer: &Observer, neutral: [f64; 3]) -> Result<[f64; 2], String> {
         if !neutral.iter().all(|signal| *signal > 0.0 && signal.is_finite()) {
             return Err("AsShotNeutral has a number that is not above 0".into());
         }
         let mut last = D50_XY;
         for _ in 0..MOST_STEPS {
-            let xyz = inverse(&self.camera_from_xyz(observer, last))? * Vector3::from(neutral);
-            let next = checked([xyz.x / xyz.sum(), xyz.y / xyz.sum()])?;
+            let next = self.white_at(self.share_of_first(observer, last), neutral)?;
             if (next[0] - last[0]).abs() + (next[1] - last[1]).abs() < NEAR {
                 return Ok(next);
             }
             last = if self.second.is_some() { next } else { return Ok(next) };
         }
-        let before = last;
-        let xyz = inverse(&self.camera_from_xyz(observer, last))? * Vector3::from(neutral);
-        checked([0, 1].map(|i| 0.5 * (before[i] + xyz[i] / xyz.sum())))
+        self.consistent_white(observer, neutral, self.share_of_first(observer, last))
+    }
+
+    /// The chromaticity of `neutral` by the matrices of a share of the first illuminant.
+    fn white_at(&self, share: f64, neutral: [f64; 3]) -> Result<[f64; 2], String> {
+        let xyz = inverse(&self.at_share(share))? * Vector3::from(neutral);
+        checked([xyz.x / xyz.sum(), xyz.y / xyz.sum()])
+    }
+
+    /// The white whose own share of the first illuminant is that by which it is found: by halves between a share and the one that
+    /// follows from it, or from 0 to 1, where there is one, as what follows is continuous and no less than 0 and no more than 1.
+    fn consistent_white(&self, observer: &Observer, neutral: [f64; 3], share: f64) -> Result<[f64; 2], String> {
+        const HALVES: usize = 52;
+        /// What a share may be off by: the temperature of a white is found to 10⁻⁶.
+        const OFF: f64 = 1e-4;
+        let rise = |share: f64| -> Result<f64, String> {
+            Ok(self.share_of_first(observer, self.white_at(share, neutral)?) - share)
+        };
+        let next = share + rise(share)?;
+        let [mut low, mut high] = [share.min(next), share.max(next)];
+        if !(rise(low)? >= 0.0 && rise(high)? <= 0.0) {
+            [low, high] = [0.0, 1.0];
+        }
+        for _ in 0..HALVES {
+            let middle = low.midpoint(high);
+            if rise(middle)? > 0.0 { low = middle } else { high = middle }
+        }
+        let found = low.midpoint(high);
+        if rise(found)?.abs() > OFF {
+            return Err(
+                "no white of the exposure is that of AsShotNeutral by the matrices for its own temperature".into()
+            );
+        }
+        self.white_at(found, neutral)
     }
 }
 
@@ -254,6 +288,36 @@ mod tests {
             // The temperature of the white is found to 10⁻⁶.
             assert!((adapted - forward).amax() < 1e-5, "{adapted} {forward}");
         }
+    }
+
+    /// Matrices so unlike that guesses go to and fro: the white is still that of the matrices for its own temperature, so that they take the
+    /// neutral to it.
+    #[test]
+    fn a_white_that_guesses_jump_about_is_found() {
+        let observer = load_observer().unwrap();
+        let far = |set: Illuminated, red: f64| {
+            let mut color_matrix = set.color_matrix;
+            color_matrix.row_mut(0).scale_mut(red);
+            Illuminated { color_matrix, ..set }
+        };
+        let plain = two();
+        let (first, second) = (far(plain.first, 1.4), plain.second.map(|second| far(second, 1.0 / 1.4)));
+        let calibration = Calibration { first, second, ..plain };
+        let mut jumps = 0;
+        for white in [[0.36, 0.37], [0.40, 0.39]] {
+            let signals =
+                calibration.camera_from_xyz(&observer, white) * Vector3::from(xyz_of_chromaticity(white, 1.0));
+            let mapped = calibration.mapped(&observer, Light::Neutral(signals.into())).unwrap();
+            let found = crate::color::chromaticity((mapped.xyz_from_camera * signals).into());
+            assert!((0..2).all(|i| (found[i] - mapped.white_xy[i]).abs() < 1e-4), "{found:?} {mapped:?}");
+            let guess = |xy| {
+                let inverse = calibration.camera_from_xyz(&observer, xy).try_inverse().unwrap();
+                crate::color::chromaticity((inverse * signals).into())
+            };
+            let end = (0..MOST_STEPS).fold(D50_XY, |xy, _| guess(xy));
+            jumps += usize::from((guess(end)[0] - end[0]).abs() > 1e-3);
+        }
+        assert!(jumps > 0);
     }
 
     #[test]

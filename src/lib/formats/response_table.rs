@@ -5,7 +5,7 @@ use super::response_import::{self, Samples};
 use super::wavelengths::check_nm;
 use crate::cfa::Class;
 use crate::error::{Error, Result};
-use crate::spectrum::Curve;
+use crate::spectrum::{Curve, not_in_order};
 
 /// Fewer wavelengths follow no filter of a camera.
 const LEAST_SAMPLES: usize = 10;
@@ -184,11 +184,7 @@ fn exchanged(wavelength_nm: &[f64], values: &[Vec<f64>; 3]) -> Option<String> {
         moment / values.iter().sum::<f64>()
     };
     let [red, green, blue] = values.each_ref().map(mean);
-    (!(blue < green && green < red)).then(|| {
-        format!(
-            "the mean wavelengths of R, G and B are {red:.0}, {green:.0} and {blue:.0} nm, which is not the order of their names"
-        )
-    })
+    (!(blue < green && green < red)).then(|| not_in_order([red, green, blue]))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::notes::Note;
 use super::options::{Output, WhiteChoice};
 use super::values::{self, LightColor};
 use crate::analysis::characterization::CameraMatrix;
+use crate::cfa::FilterArray;
 use crate::color::adaptation::Adaptation;
 use crate::color::temperature::Locus;
 use crate::color::{self, Space, White, rows_of};
@@ -328,9 +329,8 @@ pub fn own_matrix(frame: &FrameHeader) -> Result<(CameraMatrix, Note)> {
         }
         (_, None) => {
             let mut problem = format!("{}: neither its sensor nor its raw file tells a matrix", frame.name);
-            if sensor.is_none() {
-                problem += "; of a DNG with a ColorMatrix1 and no white of its exposure (AsShotNeutral) \
-                            `fit-matrix --from-raw FILE.dng --illuminant d65 -o m.yaml` makes one";
+            if sensor.is_none() && frame.metadata.cfa != Some(FilterArray::Monochrome) {
+                problem += "; of a DNG `import-raw FILE.dng -v` tells what its matrix lacks, and what makes one";
             }
             Err(Error::Usage(problem).give(&["matrix"]))
         }

@@ -10,6 +10,10 @@ const ELEMENTS: usize = 9;
 /// The fewest patches: three would be met exactly, and nothing would tell how well.
 const FEWEST: usize = 4;
 
+/// In each mixture of the classes the signals are so many times their noise at least, as squares: noise alone makes 1, within 0.3 of 24
+/// patches.
+const LEAST_ABOVE_NOISE: f64 = 4.0;
+
 /// Covariance of the elements of the matrix, row by row.
 pub type ElementCovariance = SMatrix<f64, ELEMENTS, ELEMENTS>;
 
@@ -104,6 +108,13 @@ pub fn fit(patches: &[Patch], misfit: Misfit) -> Result<ChartMatrix> {
              {LARGEST_CONDITION:.0e}; give more varied colors"
         )));
     }
+    if least_above_noise(patches) < LEAST_ABOVE_NOISE {
+        return Err(Error::Data(
+            "the signals of the patches do not determine the matrix: what tells one class from the others is no more than \
+             their noise; check that the classes are R, G and B, or give more varied colors"
+                .into(),
+        ));
+    }
     let start = plain(patches)?;
     let degrees = 3 * patches.len() - ELEMENTS;
     let squares: f64 = patches.iter().map(|patch| patch.residual(&start).norm_squared()).sum();
@@ -173,6 +184,16 @@ fn condition(patches: &[Patch]) -> f64 {
     }
     let singular = signals.singular_values();
     singular.max() / singular.min()
+}
+
+/// The smallest ratio of Σ (wᵀc)² to Σ wᵀS w that a mixture w of the classes has; infinite where the noise is not known, or has none of a
+/// mixture.
+fn least_above_noise(patches: &[Patch]) -> f64 {
+    let sum = |of: &dyn Fn(&Patch) -> Matrix3<f64>| patches.iter().fold(Matrix3::zeros(), |sum, patch| sum + of(patch));
+    let noise = sum(&|patch| patch.covariance);
+    let Some(inverse) = noise.cholesky().and_then(|factors| factors.l().try_inverse()) else { return f64::INFINITY };
+    let signals = sum(&|patch| patch.signal * patch.signal.transpose());
+    (inverse * signals * inverse.transpose()).symmetric_eigenvalues().min()
 }
 
 /// Steps from a matrix to the minimum for a variance of the misfit; none where it is not reached, or a weight is infinite.

@@ -4,4 +4,6 @@ pub mod fit;
 pub mod grid;
 pub mod judgment;
 pub mod neutrals;
+pub mod order;
+pub mod outliers;
 pub mod reading;

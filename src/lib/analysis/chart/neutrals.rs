@@ -2,6 +2,7 @@
 
 use super::fit::Patch;
 use crate::color::lab_from_xyz;
+use nalgebra::Vector3;
 
 /// Patches of no more chroma, C\*ab, are neutral: those of charts have 3 at most.
 const MOST_CHROMA: f64 = 5.0;
@@ -31,6 +32,29 @@ impl Offsets {
     }
 }
 
+/// The color of the neutral patches of a chart, Y = 1: the mean of those that are neutral about a white, or, where these are too few or too
+/// much alike, of those in proportion to the brightest patch; none where these are too.
+pub fn neutral_white(colors: &[[f64; 3]], white: [f64; 3]) -> Option<[f64; 3]> {
+    let about = |white: [f64; 3]| {
+        let neutral: Vec<&[f64; 3]> = colors.iter().filter(|color| is_neutral(**color, white)).collect();
+        let sum = neutral.iter().fold(Vector3::zeros(), |sum, color| sum + Vector3::from(**color));
+        is_row(&neutral.iter().map(|color| color[1]).collect::<Vec<_>>()).then(|| (sum / sum.y).into())
+    };
+    let brightest = colors.iter().max_by(|one, other| one[1].total_cmp(&other[1]))?;
+    about(white).or_else(|| about(brightest.map(|value| value / brightest[1])))
+}
+
+fn is_neutral(color: [f64; 3], white: [f64; 3]) -> bool {
+    let [_, a, b] = lab_from_xyz(color, white);
+    color[1] > 0.0 && a.hypot(b) <= MOST_CHROMA
+}
+
+/// Whether luminances are enough, and span enough, for a line through them.
+fn is_row(luminances: &[f64]) -> bool {
+    let [low, high] = luminances.iter().fold([f64::INFINITY, 0.0_f64], |[low, high], y| [low.min(*y), high.max(*y)]);
+    luminances.len() >= FEWEST && (LEAST_SPAN..).contains(&(high / low))
+}
+
 /// The offsets of signals from lines through zero, by the neutral patches about a white; none where these are too few or too much alike.
 ///
 /// s = b + a Y, weighed by 1/(s² + (a ∂Y/∂L\* ΔL\*)²)        s: noise of the mean
@@ -38,18 +62,13 @@ impl Offsets {
 /// Errors of the references are even in L\*, so that the dark patches rule, and light that falls off along the
 /// row moves b by less than it falls: by a fifth from end to end, b is 0.008 of white, three standard errors.
 pub fn offsets(patches: &[Patch], white: [f64; 3]) -> Option<Offsets> {
-    let is_neutral = |patch: &&Patch| {
-        let [_, a, b] = lab_from_xyz(patch.reference.into(), white);
-        patch.reference.y > 0.0 && a.hypot(b) <= MOST_CHROMA
-    };
-    let neutral: Vec<&Patch> = patches.iter().filter(is_neutral).collect();
-    let luminances = || neutral.iter().map(|patch| patch.reference.y);
-    let [low, high] = luminances().fold([f64::INFINITY, 0.0_f64], |[low, high], y| [low.min(y), high.max(y)]);
-    if neutral.len() < FEWEST || !(LEAST_SPAN..).contains(&(high / low)) {
+    let neutral: Vec<&Patch> = patches.iter().filter(|patch| is_neutral(patch.reference.into(), white)).collect();
+    let luminances: Vec<f64> = neutral.iter().map(|patch| patch.reference.y).collect();
+    if !is_row(&luminances) {
         return None;
     }
     let lines = [0, 1, 2].map(|class| {
-        let mut slope = neutral.iter().map(|patch| patch.signal[class]).sum::<f64>() / luminances().sum::<f64>();
+        let mut slope = neutral.iter().map(|patch| patch.signal[class]).sum::<f64>() / luminances.iter().sum::<f64>();
         let mut found = [f64::NAN; 2];
         // The weights hang on the slope, by little.
         for _ in 0..4 {
@@ -84,7 +103,7 @@ mod tests {
     use super::*;
     use crate::color::{xyz_from_lab, xyz_of_chromaticity};
     use crate::random::{Run, RunWords, Source};
-    use nalgebra::{Matrix3, Vector3};
+    use nalgebra::Matrix3;
 
     const NEUTRALS: [f64; 6] = [95.2, 81.3, 66.9, 50.8, 35.6, 20.6];
 

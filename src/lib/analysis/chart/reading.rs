@@ -2,7 +2,7 @@
 
 use super::grid::{COLUMNS, Grid, ROWS};
 use crate::camera::levels::BlackLevels;
-use crate::cfa::CfaPattern;
+use crate::cfa::{CfaPattern, Places};
 use crate::error::Result;
 use crate::metadata::FrameHeader;
 use crate::stages::saturation::FullLevels;
@@ -54,6 +54,8 @@ pub struct ReadPatch {
     pub count: [u64; 3],
     /// Photosites that are saturated.
     pub saturated: u64,
+    /// What each place of the 2×2 at the sensor's corner makes of it.
+    pub places: Places,
 }
 
 impl ReadPatch {
@@ -99,6 +101,12 @@ pub fn cut_off(read: &[ReadPatch], range_adu: f64) -> Vec<(usize, usize)> {
     let open = read.iter().enumerate().filter(|(_, patch)| patch.saturated == 0);
     open.flat_map(|(index, patch)| (0..3).filter(move |class| is_cut(patch, *class)).map(move |class| (index, class)))
         .collect()
+}
+
+/// What is wrong with the Bayer pattern that a chart was read by, where its greens are red and blue.
+pub fn doubt_of_pattern(read: &[ReadPatch], said: CfaPattern) -> Option<String> {
+    let open: Vec<Places> = read.iter().filter(|patch| patch.saturated == 0).map(|patch| patch.places).collect();
+    Places::doubt_in_colors(&open, said)
 }
 
 /// Sums of one class of one patch.
@@ -162,6 +170,8 @@ pub struct ChartReader {
     width: usize,
     next_row: usize,
     sums: Vec<[Sums; 3]>,
+    /// Of each patch the sums and counts at the places of the 2×2 at the sensor's corner.
+    at_places: Vec<[(f64, u64); 4]>,
     /// Of the last even and the last odd row the patch and the value at each column.
     above: [Vec<Option<(usize, f64)>>; 2],
 }
@@ -203,14 +213,32 @@ impl ChartReader {
             );
         }
         let sums = vec![[Sums::default(); 3]; PATCHES];
+        let at_places = vec![[(0.0, 0); 4]; PATCHES];
         let origin = frame.geometry.origin;
         let above = std::array::from_fn(|_| vec![None; width]);
-        Ok(Self { grid, pattern, origin, black, full: full.classes(), range, width, next_row: 0, sums, above })
+        Ok(Self {
+            grid,
+            pattern,
+            origin,
+            black,
+            full: full.classes(),
+            range,
+            width,
+            next_row: 0,
+            sums,
+            at_places,
+            above,
+        })
     }
 
     /// White level less black level of the frame, ADU, of which signals are shares.
     pub fn range_adu(&self) -> f64 {
         self.range
+    }
+
+    /// The Bayer pattern that it is read by.
+    pub fn pattern(&self) -> CfaPattern {
+        self.pattern
     }
 
     /// Takes the next rows of the frame.
@@ -234,6 +262,8 @@ impl ChartReader {
                 sums.saturated += u64::from(sample.is_nan() || *sample >= self.full[class]);
                 sums.add(value);
                 sums.note_largest(*sample);
+                let (sum, count) = &mut self.at_places[patch][place([x, y], self.origin)];
+                (*sum, *count) = (*sum + value, *count + 1);
                 for (along, neighbor) in [last[x % 2], *above].into_iter().enumerate() {
                     if let Some((_, before)) = neighbor.filter(|(other, _)| *other == patch) {
                         sums.add_pair(along, value - before);
@@ -256,9 +286,14 @@ impl ChartReader {
                 "a patch of the chart has {fewest} photosites of a class; the means take {FEWEST_SITES} at least"
             ));
         }
-        let read = |sums: [Sums; 3]| {
+        let read = |(sums, at_places): ([Sums; 3], [(f64, u64); 4])| {
             let variance = |s: Sums| s.about_mean / (s.count - 1) as f64;
+            let noise = sums.map(|s| s.noise().0).into_iter().fold(0.0, f64::max);
             ReadPatch {
+                places: Places {
+                    signal: at_places.map(|(sum, count)| sum / count as f64),
+                    variance: at_places.map(|(_, count)| noise * noise / count as f64),
+                },
                 signal: sums.map(|s| s.mean),
                 variance: sums.map(|s| variance(s) / s.count as f64),
                 scatter: sums.map(|s| variance(s).sqrt()),
@@ -270,8 +305,14 @@ impl ChartReader {
                 saturated: sums.iter().map(|s| s.saturated).sum(),
             }
         };
-        Ok(self.sums.into_iter().map(read).collect())
+        Ok(self.sums.into_iter().zip(self.at_places).map(read).collect())
     }
+}
+
+/// Which place of the 2×2 at the sensor's corner a photosite has, of a frame whose first is `origin`.
+fn place([x, y]: [usize; 2], origin: [i32; 2]) -> usize {
+    let odd = |at: usize, first: i32| (at + usize::from(first & 1 != 0)) % 2;
+    2 * odd(y, origin[1]) + odd(x, origin[0])
 }
 
 #[cfg(test)]

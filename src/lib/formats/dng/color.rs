@@ -52,7 +52,11 @@ pub(super) fn relative_matrix(
     image: &RawImage,
     notes: &mut Vec<String>,
 ) -> Result<Option<RelativeMatrix>> {
-    if image.is_monochrome || !has_matrix(image) {
+    if image.is_monochrome {
+        return Ok(None);
+    }
+    if !has_matrix(image) {
+        notes.extend(astray(image).map(|why| format!("its color matrix is passed over: {why}")));
         return Ok(None);
     }
     let found = match found(file, image, notes) {
@@ -83,7 +87,13 @@ fn found(
     }
     let light = match light(file, image)? {
         Ok(light) => light,
-        Err(why) => return Ok(Err(why)),
+        Err(why) => {
+            // What else may be wrong with them shows in any light.
+            let others = mapped(file, image, Light::White(color::D65_XY), "d65", OwnMatrix::Color, &mut Vec::new())?;
+            let advice =
+                "`fit-matrix --from-raw FILE.dng --illuminant d65 -o m.yaml` makes one for a light that is named";
+            return Ok(Err(others.map_or_else(|problem| problem, |_| format!("{why}; {advice}"))));
+        }
     };
     mapped(file, image, light, "the white of the exposure", OwnMatrix::Color, notes)
 }
@@ -91,6 +101,19 @@ fn found(
 /// Whether there is a matrix for an illuminant.
 fn has_matrix(image: &RawImage) -> bool {
     tags::COLOR_MATRICES.iter().any(|tag| tag.is_in(&image.first))
+}
+
+/// Why color matrices do not count that are there without ColorMatrix1 where it belongs.
+fn astray(image: &RawImage) -> Option<&'static str> {
+    let [first, second] = tags::COLOR_MATRICES;
+    let mut all = [first, second, tags::COLOR_MATRIX_3].into_iter();
+    if tags::COLOR_MATRIX_3.is_in(&image.first) {
+        Some("ColorMatrix1 is missing")
+    } else if all.any(|tag| tag.is_in(image.directory())) {
+        Some("it stands in the directory of the samples, and counts in the first alone")
+    } else {
+        None
+    }
 }
 
 /// Which of the matrices of a DNG.
@@ -123,8 +146,12 @@ pub fn own_matrix(path: &Path, light_named: Option<([f64; 2], String)>, which: O
     let (file, name) = open_named(Some(path))?;
     let mut file = TiffFile::open(file, &name)?;
     let image = RawImage::find(&mut file)?;
-    if image.is_monochrome || !has_matrix(&image) {
-        return Err(Error::format(&name, "it tells no color matrix (ColorMatrix1)"));
+    if image.is_monochrome {
+        return Err(Error::format(&name, "it is monochrome, and has no colors"));
+    }
+    if !has_matrix(&image) {
+        let why = astray(&image).map_or_else(String::new, |why| format!(": {why}"));
+        return Err(Error::format(&name, format!("it tells no color matrix (ColorMatrix1){why}")));
     }
     let mut notes = Vec::new();
     let (light, named) = match light_named {

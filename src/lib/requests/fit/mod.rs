@@ -1,7 +1,6 @@
 //! Fitting a matrix: from a library of spectra, with parts of it held out, to a matrix and how well it does.
 
 mod chart;
-mod chart_doubts;
 mod evaluation;
 mod exposure;
 mod fitting;

@@ -1,10 +1,14 @@
-//! What may not be meant about a chart: by the scatter of its patches, and by its neutral ones.
+//! What may not be meant about a chart: by the scatter of its patches, by its neutral ones, and by what the matrix makes of them.
 
-use super::super::notes::Note;
-use crate::analysis::chart::fit::Patch;
+use super::super::super::notes::Note;
+use crate::analysis::chart::fit::{ChartMatrix, Patch};
 use crate::analysis::chart::neutrals::offsets;
+use crate::analysis::chart::order::out_of_order;
+use crate::analysis::chart::outliers::outliers;
 use crate::analysis::chart::reading::{ReadPatch, cut_off};
 use crate::cfa::Class;
+use crate::error::Result;
+use crate::spectrum::{Observer, not_in_order};
 use crate::text::in_digits;
 
 /// Warnings of what was read of the patches of a chart in a frame: `name` names them, `range_adu` is white level less black level.
@@ -66,4 +70,42 @@ pub(super) fn of_neutrals(source: &str, patches: &[Patch], white: [f64; 3], rang
         "{source}: its neutral patches are not in proportion to their luminance: where no light is they would read {}{unit}; {cause}",
         offs.join(", ")
     )))
+}
+
+/// Warnings of patches that fit the colors of each other, and of others that lie far from what the rest makes of them.
+pub(super) fn of_names(source: &str, patches: &[Patch], white: [f64; 3]) -> Vec<Note> {
+    let Some(found) = outliers(patches, white) else { return Vec::new() };
+    let off = |patch: usize| format!("{} {:.1}", patches[patch].name, found.delta_e[patch]);
+    let usual = format!("Delta E*ab from where the matrix of the others has them, {:.1} in the median", found.median);
+    let exchanged = found.exchanged.iter().map(|([one, other], then)| {
+        format!(
+            "{} and {} lie {usual}; exchanged they lie {:.1} and {:.1} off: are their names exchanged?",
+            off(*one),
+            off(*other),
+            then[0],
+            then[1]
+        )
+    });
+    let far: Vec<String> = found.far.iter().map(|patch| off(*patch)).collect();
+    let far = (!far.is_empty()).then(|| {
+        format!("far off are {} {usual}: check the names, and the patches for glare, shade and dirt", far.join(", "))
+    });
+    exchanged.chain(far).map(|text| Note::Warning(format!("{source}: {text}"))).collect()
+}
+
+/// A warning of classes of a matrix that are not red, green and blue in this order.
+///
+/// # Errors
+///
+/// Those of [`out_of_order`].
+pub(super) fn of_classes(
+    source: &str,
+    found: &ChartMatrix,
+    observer: &Observer,
+    is_frame: bool,
+) -> Result<Option<Note>> {
+    let check = if is_frame { "check the pattern of the filters, --cfa" } else { "check the columns R, G and B" };
+    let told = out_of_order(found, observer)?
+        .map(|mean_nm| format!("{source}: by the matrix {}; {check}", not_in_order(mean_nm)));
+    Ok(told.map(Note::Warning))
 }

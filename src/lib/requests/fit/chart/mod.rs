@@ -1,32 +1,32 @@
 //! Fitting a matrix to a chart of known colors, seen by the camera.
 
+mod doubts;
+mod expected;
+mod seen;
+
 use super::super::described::{Described, DescribedWithBlack, SaidExposure};
 use super::super::notes::Note;
 use super::super::options::Selection;
 use super::super::values;
-use super::chart_doubts;
 use super::exposure::ChartExposure;
 use crate::analysis::characterization::regression::residuals;
 use crate::analysis::characterization::{
     CameraMatrix, ChartRecord, MATRIX_UNIT, MatrixUncertainty, RELATIVE_MATRIX_UNIT, Signals, Training,
 };
 use crate::analysis::chart::fit::{ChartMatrix, Misfit, Patch, fit};
-use crate::analysis::chart::grid::Grid;
 use crate::analysis::chart::judgment::{Judgment, judge};
-use crate::analysis::chart::reading::{ChartReader, ReadPatch};
 use crate::camera::levels::BlackLevel;
 use crate::cfa::FilterArray;
-use crate::color::adaptation::Adaptation;
-use crate::color::{chromaticity, rows_of, xyz_of_chromaticity};
+use crate::color::{chromaticity, rows_of};
 use crate::error::{Error, Result};
-use crate::formats::chart::{Colors, DEFAULT_REFERENCE, Light, Reference, load_patches, load_reference};
+use crate::formats::chart::{DEFAULT_REFERENCE, Light, Reference, load_reference};
 use crate::formats::data;
 use crate::formats::input::{FrameReader, InputOptions};
-use crate::metadata::FrameHeader;
 use crate::requests::values::LightColor;
-use crate::stream::RowSource;
 use clap::Args;
+use expected::Expected;
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use seen::{Seen, Turned, see_frame, see_table};
 use std::path::{Path, PathBuf};
 
 /// Share of white by which the references of a chart and what no matrix does are never off.
@@ -93,41 +93,9 @@ pub struct ChartFound {
     pub notes: Vec<Note>,
 }
 
-/// What a camera read of patches.
-struct Seen {
-    /// Where from.
-    source: String,
-    names: Option<Vec<String>>,
-    signals: Vec<Vector3<f64>>,
-    covariances: Vec<Matrix3<f64>>,
-    /// Patches that do not count, and why.
-    left_out: Vec<(usize, String)>,
-    frame: Option<FrameHeader>,
-    /// White level less black level, where means are not shares of it already.
-    range_adu: Option<f64>,
-    notes: Vec<Note>,
-    /// What was read of the patches of a chart in a frame; none of a table.
-    read: Vec<ReadPatch>,
-}
-
-/// What a camera read of the patches of a chart if it is turned.
-struct Turned {
-    corners: [[f64; 2]; 4],
-    seen: Seen,
-}
-
 /// So many times smaller residuals tell that a chart is turned: those of charts as they are given are some hundredths of white,
 /// and those of charts that are turned several times as large.
 const MUCH_BETTER: f64 = 2.0;
-
-/// Colors of patches in a light.
-struct Expected {
-    names: Vec<String>,
-    xyz: Vec<[f64; 3]>,
-    white: [f64; 3],
-    light: String,
-    notes: Vec<Note>,
-}
 
 impl ChartFit {
     /// The light that is named, if one is.
@@ -180,7 +148,7 @@ impl ChartFit {
                 ));
             }
             (Some(frame), Some(corners), _) => see_frame(self.open(frame)?, corners)?,
-            (_, _, Some(table)) => (self.see_table(table)?, Vec::new()),
+            (_, _, Some(table)) => (see_table(table, self.levels)?, Vec::new()),
             _ if self.levels.is_some() => {
                 let problem = "levels are those of a chart; give --chart or --patches";
                 return Err(Error::Usage(problem.into()).leave_out(&["levels"]));
@@ -188,7 +156,8 @@ impl ChartFit {
             _ => return Ok(None),
         };
         let reference = load_reference(&self.reference)?;
-        let expected = self.expected(&reference)?;
+        let observer = data::load_observer()?;
+        let expected = Expected::new(&reference, self.reference_light, self.light()?, &observer)?;
         let patches = matched(&seen, &expected, &reference)?;
         for Turned { corners, seen: turned } in &turned {
             let gain = residual(&patches) / residual(&matched(turned, &expected, &reference)?);
@@ -215,7 +184,10 @@ impl ChartFit {
         };
         let mut notes: Vec<Note> = seen.notes.iter().chain(&expected.notes).cloned().collect();
         notes.extend(doubts(&seen, &expected, &found));
-        notes.extend(chart_doubts::of_neutrals(&seen.source, &patches, expected.white, seen.range_adu));
+        let neutral = expected.neutral.unwrap_or(expected.white);
+        notes.extend(doubts::of_neutrals(&seen.source, &patches, neutral, seen.range_adu));
+        notes.extend(doubts::of_names(&seen.source, &patches, expected.white));
+        notes.extend(doubts::of_classes(&seen.source, &found, &observer, seen.frame.is_some())?);
         let matrix = self.matrix(&seen, &expected, &reference, &patches, &found)?;
         Ok(Some(ChartFound { matrix, judgment, notes }))
     }
@@ -229,74 +201,6 @@ impl ChartFit {
         let mut reader = DescribedWithBlack { described, black_level_adu }.open(&options)?;
         self.exposure.0.apply(reader.header_mut())?;
         Ok(reader)
-    }
-
-    /// Means of a table.
-    fn see_table(&self, path: &Path) -> Result<Seen> {
-        let table = load_patches(path)?;
-        let [black, white] = self.levels.unwrap_or([0.0, 1.0]);
-        let range = white - black;
-        if self.levels.is_none() && table.means.as_flattened().iter().any(|mean| *mean > 1.0) {
-            let problem = "its means are above 1; shares of white level less black level are not";
-            return Err(Error::format(&path.display().to_string(), problem).give(&["levels"]));
-        }
-        let share = |mean: &[f64; 3]| Vector3::from(mean.map(|value| (value - black) / range));
-        let is_full = |mean: &[f64; 3]| mean.iter().any(|value| *value >= white);
-        let full = table.means.iter().enumerate().filter(|(_, mean)| is_full(mean));
-        Ok(Seen {
-            source: path.display().to_string(),
-            left_out: full.map(|(index, _)| (index, "its mean is at the white level".to_owned())).collect(),
-            signals: table.means.iter().map(share).collect(),
-            covariances: table.covariances.iter().map(|covariance| covariance / (range * range)).collect(),
-            names: table.names,
-            frame: None,
-            range_adu: self.levels.map(|_| range),
-            notes: Vec::new(),
-            read: Vec::new(),
-        })
-    }
-
-    /// The colors of a reference in the light of the chart.
-    fn expected(&self, reference: &Reference) -> Result<Expected> {
-        let observer = data::load_observer()?;
-        let light = self.light()?;
-        let names = reference.names.clone();
-        let source = &reference.name;
-        if let Colors::Reflectance(curves) = &reference.colors {
-            let Some(light) = light else {
-                let problem = format!("{source}: reflectances have a color in a light alone");
-                return Err(Error::Usage(problem).give(&["illuminant"]));
-            };
-            let (xyz, white) = light.xyz(curves, &observer)?;
-            return Ok(Expected { names, xyz, white, light: light.name(), notes: Vec::new() });
-        }
-        let from_xy = self.reference_light.xy(&observer);
-        let white = xyz_of_chromaticity(from_xy, 1.0);
-        let xyz = reference.colors_in(white).unwrap_or_default();
-        let of_reference = match self.reference_light {
-            LightColor::Illuminant(illuminant) => illuminant.to_string(),
-            LightColor::Chromaticity([x, y]) => format!("x {x}, y {y}"),
-        };
-        let Some(light) = light else {
-            let text = format!("XYZ are those of the chart in the light of its reference, {of_reference}");
-            return Ok(Expected { names, xyz, white, light: of_reference, notes: vec![Note::Remark(text)] });
-        };
-        let white = match &light {
-            Light::Illuminant(illuminant) => xyz_of_chromaticity(illuminant.white_xy(&observer), 1.0),
-            Light::Measured(..) => light.xyz(&[], &observer)?.1,
-        };
-        let to_xy = chromaticity(white);
-        let adaptation = Adaptation::Bradford.between(from_xy, to_xy).map_err(Error::Usage)?;
-        let adapted = xyz.into_iter().map(|xyz| (adaptation * Vector3::from(xyz)).into()).collect();
-        let mut notes = Vec::new();
-        if to_xy != from_xy {
-            let name = light.name();
-            notes.push(Note::Warning(format!(
-                "{source}: its colors are for {of_reference}; they are adapted to {name} by Bradford's transform, which is some \
-                 Delta E off what reflectances would give"
-            )));
-        }
-        Ok(Expected { names, xyz: adapted, white, light: light.name(), notes })
     }
 
     /// The matrix file.
@@ -379,58 +283,6 @@ fn residual(patches: &[Patch]) -> f64 {
     (squares.sum::<f64>() / patches.len() as f64).sqrt()
 }
 
-/// Means of the patches in a frame, and those that there would be if the corners were given from another on.
-fn see_frame(mut reader: FrameReader, corners: [[f64; 2]; 4]) -> Result<(Seen, Vec<Turned>)> {
-    let frame = reader.header().clone();
-    let mut charts = Vec::new();
-    for turns in 0..corners.len() {
-        let mut corners = corners;
-        corners.rotate_left(turns);
-        let grid = Grid::new(corners).map_err(|problem| Error::Usage(format!("--corners: {problem}")))?;
-        charts.push((corners, ChartReader::new(&frame, grid)?));
-    }
-    let range_adu = charts.first().map(|(_, chart)| chart.range_adu());
-    frame.black_levels()?.into_iter().for_each(|black| reader.compare_masked(black));
-    let height = frame.geometry.height;
-    let step = frame.geometry.band_rows(frame.geometry.step_rows(reader.natural_rows()), 1);
-    let (mut rows, mut done) = (Vec::new(), 0);
-    while done < height {
-        rows.clear();
-        let count = step.min(height - done);
-        reader.read(count, &mut rows)?;
-        charts.iter_mut().for_each(|(_, chart)| chart.take(&rows));
-        done += count;
-    }
-    let mut all = charts.into_iter().map(|(corners, chart)| (corners, chart.finish()));
-    let read = all.next().map_or(Ok(Vec::new()), |(_, read)| read).map_err(|problem| frame.refuse(problem))?;
-    let turned =
-        all.filter_map(|(corners, read)| Some(Turned { corners, seen: seen_in(&frame, &read.ok()?, Vec::new()) }));
-    let turned = turned.collect();
-    let mut notes = super::super::notes::of_reader(&reader);
-    let least = read.iter().flat_map(|patch| patch.count).min().unwrap_or(0);
-    notes.push(Note::Remark(format!("{}: {least} photosites or more of each class in a patch", frame.name)));
-    Ok((Seen { range_adu, ..seen_in(&frame, &read, notes) }, turned))
-}
-
-/// What was read of the patches of a chart in a frame.
-fn seen_in(frame: &FrameHeader, read: &[ReadPatch], notes: Vec<Note>) -> Seen {
-    let full = read.iter().enumerate().filter(|(_, patch)| patch.saturated > 0);
-    Seen {
-        source: frame.name.clone(),
-        names: None,
-        left_out: full.map(|(index, patch)| (index, format!("{} photosites are saturated", patch.saturated))).collect(),
-        read: read.to_vec(),
-        signals: read.iter().map(|patch| Vector3::from(patch.signal)).collect(),
-        covariances: read
-            .iter()
-            .map(|patch: &ReadPatch| Matrix3::from_diagonal(&Vector3::from(patch.variance)))
-            .collect(),
-        frame: Some(frame.clone()),
-        range_adu: None,
-        notes,
-    }
-}
-
 /// A name as it is compared: small letters and digits alone.
 fn plain(name: &str) -> String {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
@@ -473,7 +325,7 @@ fn doubts(seen: &Seen, expected: &Expected, found: &ChartMatrix) -> Vec<Note> {
         .map(|(index, why)| Note::Warning(format!("{}: the patch {} is left out: {why}", seen.source, name(*index))))
         .collect();
     let range_adu = seen.range_adu.unwrap_or(1.0);
-    notes.extend(chart_doubts::of_patches(&seen.source, &seen.read, name, range_adu));
+    notes.extend(doubts::of_patches(&seen.source, &seen.read, name, range_adu));
     if let Some(chi_squared) = found.chi_squared_of_noise {
         let ratio = chi_squared / found.degrees as f64;
         let text = if found.misfit > 0.0 {
