@@ -6,6 +6,8 @@
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 
+/// So many comments are searched for what they say.
+pub(super) const MAX_COMMENTS: usize = 1000;
 /// So many rows are looked at for what parts their cells.
 const ROWS_LOOKED_AT: usize = 16;
 /// What may part cells, the likeliest first: a comma may be that of decimals, a blank that of words.

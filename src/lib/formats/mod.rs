@@ -7,6 +7,7 @@ pub mod chart;
 pub mod csv;
 pub mod data;
 mod delimited;
+mod described;
 pub mod digest;
 pub mod dng;
 pub mod exposure;

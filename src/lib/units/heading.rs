@@ -1,7 +1,7 @@
 //! What the heading of a column says about the unit of its numbers: as people write it, beside names, brackets and factors.
 
 use super::other::OtherUnit;
-use super::quantity::{by_spelling, is_per_interval, names, quantity_named};
+use super::quantity::{READINGS, by_spelling, is_per_interval, is_reading, names, quantity_named};
 use super::spectral::{Found, Stated, as_written, units_among};
 use super::spelling::{Base, Token, base, tokens};
 
@@ -104,8 +104,6 @@ const RATIOS: [&str; 10] = [
     "percent",
     "pct",
 ];
-/// Units of what an instrument reads.
-const READINGS: [&str; 10] = ["counts", "count", "cts", "dn", "adu", "v", "mv", "uv", "volt", "volts"];
 const PHOTONS: [&str; 3] = ["photon", "photons", "quanta"];
 
 /// The same, where the name and the unit do not contradict each other.
@@ -123,7 +121,11 @@ fn of_name_and_unit(heading: &str) -> Option<Stated> {
         if let [found] = units_among(&tokens).as_slice()
             && matches!(found.says, Stated::Radiance(_))
         {
-            let scaled = if is_beside_factor(found, text, &tokens) {
+            // One letter is a name.
+            let reads = |token: &Token| token.lower().is_some_and(|word| word.len() > 1 && is_reading(&word));
+            let scaled = if tokens.iter().any(reads) {
+                whole(OtherUnit::PerReading)
+            } else if is_beside_factor(found, text, &tokens) {
                 whole(OtherUnit::BesideFactor)
             } else {
                 beside_factor(heading, &outside)

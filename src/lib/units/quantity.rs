@@ -8,6 +8,14 @@ pub(super) fn names(heading: &str, words: &[&str]) -> bool {
     tokens(heading).iter().filter_map(Token::lower).any(|word| words.contains(&word.as_str()))
 }
 
+/// Units of what an instrument reads.
+pub(super) const READINGS: [&str; 10] = ["counts", "count", "cts", "dn", "adu", "v", "mv", "uv", "volt", "volts"];
+
+/// Whether a word is such a unit.
+pub(super) fn is_reading(word: &str) -> bool {
+    READINGS.contains(&word.to_lowercase().as_str())
+}
+
 /// What the name of a quantity is that is no light, or that of no direction.
 pub(super) fn quantity_named(text: &str) -> Option<OtherUnit> {
     const ARCSECONDS: [&str; 4] = ["arcsec", "arcsecond", "arcseconds", "asec"];
