@@ -189,7 +189,21 @@ fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
         ("  bits: 14", "  cover_glass: 14", "unknown key `readout.cover_glass`; did you mean `response.cover_glass`?"),
         ("source: nowhere", "read_noise: 3", "unknown key `read_noise`; did you mean `readout.read_noise_e`?"),
         ("source: nowhere", "observer: me", "unknown key `observer`"),
-        ("{file: qe.csv}", "{file: qe.csv, color: R}", "`response` has an unknown key `quantum_efficiency`; remove it"),
+        (
+            "{file: qe.csv}",
+            "{file: qe.csv, color: R}",
+            "`response.quantum_efficiency` has an unknown key `color`; did you mean `column`?",
+        ),
+        (
+            "  quantum_efficiency:",
+            "  qe:",
+            "unknown key `response.qe`; here it is `quantum_efficiency`, electrons per photon, within `response`",
+        ),
+        (
+            "{file: qe.csv}",
+            "{file: qe.csv, gain: 2}",
+            "`response.quantum_efficiency` has an unknown key `gain`; remove it",
+        ),
         ("sensor/2", "sensor/1", "`readout` belongs to the schema `cyanometer-sensor/2`; name that one"),
         ("sensor/2", "sensor/3", "schema is `cyanometer-sensor/3`, not `cyanometer-sensor/2` or `cyanometer-sensor/1`"),
         (

@@ -5,6 +5,7 @@
 //! nm. What parts cells and what is a comment, `delimited` tells.
 
 use super::cells::{Cells, MAX_COLUMNS, Text, numeric, unpacked};
+use super::cut_off;
 use super::delimited::{self, MAX_COMMENTS};
 use super::described::Columns;
 use super::factors::doubt_of_factor;
@@ -315,7 +316,11 @@ impl SpectralTable {
         }
         let of_uvspec =
             self.uvspec().map(|_| format!("{}: {like_uvspec}; it is `{}`", self.name, misread::UVSPEC[index]));
-        let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
+        // Of several columns a refusal names the one.
+        let is_other = matches!(heading, Some(Stated::Other { kind, .. }) if kind.conversion().is_some());
+        let of_column = format!("{}: column `{}`", self.name, self.columns[index]);
+        let name = if is_other && self.columns.len() > 1 { &of_column } else { &self.name };
+        let says = FileSays { name, heading, remarks: &self.remarks, place };
         let (unit, assumed) = radiance_unit::settle(says, given)?;
         let samples = self.values.row(index).into_iter().zip(&self.wavelength_nm);
         let brightest = samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).fold(0.0, f64::max);
@@ -380,8 +385,8 @@ impl SpectralTable {
         }
     }
 
-    /// A warning of values below zero in a curve of radiances, if there are any, or of nothing but zeros.
-    pub fn negative(&self, index: usize) -> Option<String> {
+    /// A warning of values in a curve of radiances that no light has: below zero, nothing but zeros, or cut off to zeros.
+    pub fn doubt_of_values(&self, index: usize) -> Option<String> {
         let values = self.values.row(index);
         let count = values.iter().filter(|value| **value < 0.0).count();
         let least = values.iter().copied().fold(0.0, f64::min);
@@ -389,10 +394,13 @@ impl SpectralTable {
         if values.iter().all(|value| *value == 0.0) {
             return Some(format!("{}: {which}all radiances are 0: is it the right column?", self.name));
         }
-        (count > 0).then(|| {
-            let all = values.len();
-            format!("{}: {which}{count} of {all} radiances are below 0, down to {least}, which no light is", self.name)
-        })
+        if count > 0 {
+            let (name, all) = (&self.name, values.len());
+            return Some(format!(
+                "{name}: {which}{count} of {all} radiances are below 0, down to {least}, which no light is"
+            ));
+        }
+        cut_off::doubt(&self.wavelength_nm, &values.to_vec()).map(|doubt| format!("{}: {which}{doubt}", self.name))
     }
 }
 
@@ -551,9 +559,11 @@ mod tests {
         };
         let text = "nm;L\r\n400;0,5\r\n410;1,25\r\n420;3\r\n";
         let mut tables: Vec<Vec<u8>> = vec![utf16(u16::to_le_bytes, text), utf16(u16::to_be_bytes, text)];
+        tables.extend([tables[0][2..].to_vec(), tables[1][2..].to_vec()]);
         tables.extend(
             [
                 text,
+                "nm;L\r\n400;0,5\r\n410;1,25\r\n420;3\r\n\u{1A}",
                 "nm\tL\n400,0\t0,5\n410,0\t1,25\n420,0\t3,0\n",
                 "\"400,0\",\"0,5\"\n\"410,0\",\"1,25\"\n\"420,0\",\"3,0\"\n",
                 "wavelength (nm, vacuum)\tL\n400\t0,5\n410\t1,25\n420\t3\n",
@@ -969,7 +979,10 @@ mod tests {
         }
         assert!(complaint("nu,L\n14000,1\n25000,2\n").contains("`wavenumber_cm-1`"));
         let table = SpectralTable::parse("t", b"nm,a,b\n400,1,1\n500,1,-2\n").unwrap();
-        assert_eq!(table.negative(0), None);
-        assert_eq!(table.negative(1).unwrap(), "t: `b`: 1 of 2 radiances are below 0, down to -2, which no light is");
+        assert_eq!(table.doubt_of_values(0), None);
+        assert_eq!(
+            table.doubt_of_values(1).unwrap(),
+            "t: `b`: 1 of 2 radiances are below 0, down to -2, which no light is"
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! What the heading of a column says about the unit of its numbers: as people write it, beside names, brackets and factors.
 
 use super::other::OtherUnit;
-use super::quantity::{READINGS, by_spelling, is_per_interval, is_reading, names, quantity_named};
+use super::quantity::{JANSKYS, READINGS, by_spelling, is_per_interval, is_reading, names, quantity_named};
 use super::spectral::{Found, Stated, as_written, units_among};
 use super::spelling::{Base, Token, base, tokens};
 
@@ -181,7 +181,7 @@ fn of_name_and_unit(heading: &str) -> Option<Stated> {
 /// Whether a heading without brackets is nothing but a unit: a word for levels or for light as the eye weights it, `dB`, or a word
 /// and what it is divided by, `cd/m2/nm`, `E m-2 s-1 nm-1`. One divisor may be a name's, `L/nm`.
 fn is_bare_unit(heading: &str) -> bool {
-    const LEVELS: [&str; 3] = ["db", "dbm", "flick"];
+    const LEVELS: [&str; 6] = ["db", "dbm", "flick", "flicks", "microflick", "microflicks"];
     let tokens = tokens(heading);
     let Some((Token::Factor { word, exponent: None }, rest)) = tokens.split_first() else { return false };
     let word = word.to_lowercase();
@@ -202,7 +202,7 @@ fn is_bare_unit(heading: &str) -> bool {
     match divisors {
         // Two letters are a name.
         0 => rest.is_empty() && (LEVELS.contains(&word.as_str()) || is_photometric && word.len() > 2),
-        1 => is_photometric,
+        1 => is_photometric || JANSKYS.contains(&word.as_str()),
         _ => true,
     }
 }
@@ -369,7 +369,7 @@ fn in_brackets(heading: &str) -> Option<&str> {
 /// Whether a text is the unit of something, known or not: it has powers or is divided, or is a unit or a scale that people
 /// name.
 fn looks_like_a_unit(text: &str) -> bool {
-    const NAMED: [&str; 32] = [
+    const NAMED: [&str; 35] = [
         "cd",
         "lm",
         "lx",
@@ -377,6 +377,9 @@ fn looks_like_a_unit(text: &str) -> bool {
         "nit",
         "nits",
         "flick",
+        "flicks",
+        "microflick",
+        "microflicks",
         "mw",
         "gw",
         "pw",

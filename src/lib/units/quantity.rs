@@ -16,6 +16,9 @@ pub(super) fn is_reading(word: &str) -> bool {
     READINGS.contains(&word.to_lowercase().as_str())
 }
 
+/// Units of flux per frequency.
+pub(super) const JANSKYS: [&str; 6] = ["jy", "mjy", "kjy", "ujy", "jansky", "janskys"];
+
 /// What the name of a quantity is that is no light, or that of no direction.
 pub(super) fn quantity_named(text: &str) -> Option<OtherUnit> {
     const ARCSECONDS: [&str; 4] = ["arcsec", "arcsecond", "arcseconds", "asec"];
@@ -53,7 +56,6 @@ pub(super) fn quantity_named(text: &str) -> Option<OtherUnit> {
 pub(super) fn by_spelling(text: &str) -> Option<OtherUnit> {
     const CURRENTS: [&str; 8] = ["a", "ma", "ua", "na", "amp", "amps", "ampere", "amperes"];
     const ANGLES: [&str; 7] = ["arcsec", "arcsecond", "arcseconds", "arcmin", "deg", "degree", "degrees"];
-    const JANSKYS: [&str; 6] = ["jy", "mjy", "kjy", "ujy", "jansky", "janskys"];
     let tokens = tokens(text);
     let is_power_of = |word: &str| matches!(base(word), Some(Base::Power(_)));
     let is_current = |word: &str| CURRENTS.contains(&word.to_lowercase().as_str());
@@ -141,6 +143,7 @@ mod tests {
             ("R [mA W-1]", Responsivity),
             ("responsivity", Responsivity),
             ("sky (Jy/sr)", PerFrequency),
+            ("MJy/sr", PerFrequency),
             ("radiance (W/m2/deg2/nm)", OtherAngle),
             ("radiance (W m-2 arcsec-2 nm-1)", OtherAngle),
             ("radiance (W/(m2 sr bin))", AllWavelengths),
