@@ -19,24 +19,24 @@ pub(super) fn doubt(wavelength_nm: &[f64], values: &[f64]) -> Option<String> {
         let is_large = values[near] >= LEAST_SHARE * largest;
         is_large && run.len() == LEAST_ROWS && run.iter().all(|value| *value > 0.0) && is_varied(run)
     };
-    let below = |zeros: &Range<usize>| zeros.end < values.len() && falls(zeros.end, ahead(values, zeros.end));
-    let above = |zeros: &Range<usize>| zeros.start > 0 && falls(zeros.start - 1, behind(values, zeros.start));
-    let share = |near: usize| format!("{} % of its largest", about(100.0 * values[near] / largest, 2));
+    let below = |zeros: &Range<usize>| falls(zeros.end, ahead(values, zeros.end));
+    let above = |zeros: &Range<usize>| falls(zeros.start - 1, behind(values, zeros.start));
+    let share = |near: usize| about(100.0 * values[near] / largest, 2);
     let said = zeros(values).into_iter().filter_map(|zeros| {
         let [first, last] = [wavelength_nm[zeros.start], wavelength_nm[zeros.end - 1]];
-        match (zeros.start == 0, zeros.end == values.len()) {
-            (true, false) if below(&zeros) && is_seen(zeros.end - 1) => {
-                Some(format!("up to {last} nm, beside {}", share(zeros.end)))
+        let is_large = [zeros.start > 0 && above(&zeros), zeros.end < values.len() && below(&zeros)];
+        match (zeros.start == 0, zeros.end == values.len(), is_large) {
+            (true, false, [_, true]) if is_seen(zeros.end - 1) => {
+                Some(format!("up to {last} nm, beside {} % of its largest", share(zeros.end)))
             }
-            (false, true) if above(&zeros) && is_seen(zeros.start) => {
-                Some(format!("from {first} nm on, beside {}", share(zeros.start - 1)))
+            (false, true, [true, _]) if is_seen(zeros.start) => {
+                Some(format!("from {first} nm on, beside {} % of its largest", share(zeros.start - 1)))
             }
-            (false, false) if below(&zeros) && above(&zeros) && is_seen(zeros.start) => Some(match first == last {
-                true => format!("at {first} nm, between {} and {}", share(zeros.start - 1), share(zeros.end)),
-                false => {
-                    format!("at {first} to {last} nm, between {} and {}", share(zeros.start - 1), share(zeros.end))
-                }
-            }),
+            (false, false, [true, true]) if is_seen(zeros.start) => {
+                let at = if first == last { first.to_string() } else { format!("{first} to {last}") };
+                let [before, behind] = [zeros.start - 1, zeros.end].map(share);
+                Some(format!("at {at} nm, between {before} and {behind} % of its largest"))
+            }
             _ => None,
         }
     });

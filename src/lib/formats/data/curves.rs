@@ -32,9 +32,10 @@ impl Curves<'_> {
             (None, Some(curve)) => {
                 let (classes, of_energy) = self.relative(curve)?;
                 if let Some(heading) = of_energy.as_ref().filter(|_| files.counts == Some(Counts::Quanta)) {
-                    let problem =
-                        format!("the heading `{heading}` of its response says that it counts energy, not quanta");
-                    return Err(Error::format(self.sensor, problem).leave_out(&["counts"]));
+                    let problem = format!(
+                        "the heading `{heading}` of its response says that it counts energy, and `counts` quanta; mend the one that is wrong"
+                    );
+                    return Err(Error::format(self.sensor, problem));
                 }
                 let said = files.counts.or(of_energy.map(|_| Counts::Energy));
                 let counts = said.unwrap_or_else(|| {
@@ -140,6 +141,8 @@ fn doubt_of_ends(classes: &[Curve; 3], cover_glass: Option<&Curve>) -> Option<St
 /// A warning of efficiencies of R and B that stand in each other's place, as far as no infrared counts, which B may let through.
 fn exchanged([red, _, blue]: &[Curve; 3]) -> Option<String> {
     const SEEN_NM: std::ops::RangeInclusive<u16> = 400..=680;
+    /// Curves that are alike are no more apart.
+    const APART_NM: f64 = 1.0;
     let mean = |curve: &Curve| {
         let [moment, sum] = SEEN_NM.map(f64::from).fold([0.0; 2], |[moment, sum], nm| {
             let value = curve.at(nm);
@@ -148,7 +151,7 @@ fn exchanged([red, _, blue]: &[Curve; 3]) -> Option<String> {
         moment / sum
     };
     let [red, blue] = [red, blue].map(mean);
-    (red < blue).then(|| {
+    (red + APART_NM < blue).then(|| {
         format!(
             "the mean wavelengths of its quantum efficiencies of R and B up to {} nm are {red:.0} and {blue:.0} nm, which is not the order \
              of their names",
