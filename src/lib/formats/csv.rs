@@ -149,8 +149,6 @@ impl SpectralTable {
         let are_swapped = || spectral_heading::are_swapped(&numbers).filter(|_| unit.is_none() && !by_rows);
         let (wavelength_nm, values) = in_nm(wavelengths, values, unit)
             .map_err(|problem| Error::format(name, are_swapped().unwrap_or(problem)))?;
-        let counted_in = unit.unwrap_or(WavelengthUnit::Nanometer);
-        let is_bare = said.are_bare();
         let numbers = said.are_described().then(|| (2..=columns.len() + 1).collect());
         let Comments { units: remarks, other_quantity, .. } = comments;
         let table = Self {
@@ -162,8 +160,8 @@ impl SpectralTable {
             headings,
             remarks,
             other_quantity,
-            counted_in,
-            is_bare,
+            counted_in: unit.unwrap_or(WavelengthUnit::Nanometer),
+            is_bare: said.are_bare(),
             numbers,
             points,
         };

@@ -109,7 +109,12 @@ const PHOTONS: [&str; 3] = ["photon", "photons", "quanta"];
 /// The same, where the name and the unit do not contradict each other.
 fn of_name_and_unit(heading: &str) -> Option<Stated> {
     let whole = |kind| Some(Stated::Other { text: heading.trim().to_owned(), kind });
-    let radiances = units_among(&tokens(heading)).into_iter().filter(|found| matches!(found.says, Stated::Radiance(_)));
+    let all = units_among(&tokens(heading));
+    // `(W m-2 sr-1 nm-1)/V`: what stands behind the brackets divides.
+    if all.iter().any(|found| matches!(found.says, Stated::Other { kind: OtherUnit::PerReading, .. })) {
+        return whole(OtherUnit::PerReading);
+    }
+    let radiances = all.into_iter().filter(|found| matches!(found.says, Stated::Radiance(_)));
     let radiances: Vec<Stated> = radiances.map(|found| found.says).collect();
     if radiances.windows(2).any(|pair| pair[0] != pair[1]) {
         return whole(OtherUnit::Several);

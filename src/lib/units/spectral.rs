@@ -180,13 +180,9 @@ pub(super) fn units_among(tokens: &[Token]) -> Vec<Found> {
             end += 1;
         }
         if end - begin > 1 {
-            let number = |place: usize| match &tokens[place] {
-                Token::Number(number) => Some(number.as_str()),
-                _ => None,
-            };
-            let scale = (begin > 0).then(|| number(begin - 1)).flatten();
+            let scale = begin.checked_sub(1).and_then(|place| tokens[place].number());
             // Two numbers are no scale.
-            let is_one = begin < 2 || number(begin - 2).is_none();
+            let is_one = begin < 2 || tokens[begin - 2].number().is_none();
             let from = if scale.is_some() { begin - 1 } else { begin };
             let says = product(&tokens[begin..end]);
             // What divides and is not known is part of it: `W/km2/sr/nm`, `W/m2/sr/5nm`.
