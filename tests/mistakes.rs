@@ -180,7 +180,7 @@ const MISTAKES: [(&str, i32, &str); 134] = [
     (
         "render-radiance uvspec.csv",
         BAD_DATA,
-        "uvspec.csv: its values are in `edir`, an irradiance, which has no sr-1; spectral radiances are wanted, in units such as \
+        "uvspec.csv: column `edir`: its values are in `edir`, an irradiance, which has no sr-1; spectral radiances are wanted, in units such as \
          W m-2 sr-1 nm-1: take those of one direction from where these come from; of a matt white surface they are the irradiance \
          over pi; `uu` may hold them: choose it with --column 'uu'",
     ),

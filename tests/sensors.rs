@@ -156,6 +156,55 @@ fn curves_that_say_that_they_are_something_else_are_refused() {
     }
 }
 
+#[test]
+fn what_of_a_response_may_mislead_is_told() {
+    let bench = Bench::new();
+    let load = |name: &str| load_sensor(&bench.path(name).display().to_string());
+    let doubts = |name: &str| load(name).unwrap().doubts().join("\n");
+    assert_eq!(doubts("parts.yaml"), "");
+    bench.write("qe.csv", "nm,R,G,B\n360,0.3,0.2,0.1\n830,0.1,0.2,0.3\n");
+    let told = doubts("parts.yaml");
+    assert!(
+        told.contains("efficiencies of R and B up to 680 nm are ") && told.contains("the order of their names"),
+        "{told}"
+    );
+    // All alike, at levels of their own.
+    bench.write("qe.csv", "nm,R,G,B\n360,0.3,0.2,0.1\n830,0.3,0.2,0.1\n");
+    bench.write("one.yaml", &format!("{HEAD}{READOUT}{RESPONSE}").replace("qe.csv}", "qe.csv, column: R}"));
+    assert_eq!(doubts("parts.yaml"), "");
+    let told = doubts("one.yaml");
+    assert!(
+        told.ends_with(
+            "`column: R` of its quantum efficiency does not count: each class has a column of its own, R, G and B"
+        ),
+        "{told}"
+    );
+}
+
+/// A responsivity in A/W counts energy.
+#[test]
+fn a_heading_per_watt_says_what_a_response_counts() {
+    let bench = Bench::new();
+    let load = |name: &str| load_sensor(&bench.path(name).display().to_string());
+    let doubts = |name: &str| load(name).unwrap().doubts().join("\n");
+    let bell = |nm: i32, peak: i32| (-(f64::from(nm - peak) / 40.0).powi(2)).exp();
+    let row = |nm: i32| format!("{nm},{:.6},{:.6},{:.6}\n", 0.5 * bell(nm, 600), bell(nm, 540), 0.8 * bell(nm, 460));
+    let rows: String = (380..=780).step_by(10).map(row).collect();
+    bench.write("rel.csv", &format!("nm,R (A/W),G (A/W),B (A/W)\n{rows}"));
+    let relative = format!("{HEAD}{READOUT}response:\n  relative_response: {{file: rel.csv}}\n");
+    bench.write("rel.yaml", &relative);
+    bench.write("quanta.yaml", &format!("{relative}  counts: quanta\n"));
+    assert_eq!(doubts("rel.yaml"), "");
+    let refused = load("quanta.yaml").unwrap_err().to_string();
+    assert!(
+        refused.contains("the heading `R (A/W)` of its response says that it counts energy, and `counts` quanta"),
+        "{refused}"
+    );
+    bench.write("rel.csv", &format!("nm,R,G,B\n{rows}"));
+    assert!(doubts("rel.yaml").contains("nobody says whether its response counts energy or quanta"));
+    assert_eq!(doubts("quanta.yaml"), "");
+}
+
 /// Keys of what is left out at 0 may be written out.
 #[test]
 fn what_is_nothing_may_be_said() {
@@ -189,7 +238,21 @@ fn an_unknown_key_is_answered_with_the_nearest_at_both_levels() {
         ("  bits: 14", "  cover_glass: 14", "unknown key `readout.cover_glass`; did you mean `response.cover_glass`?"),
         ("source: nowhere", "read_noise: 3", "unknown key `read_noise`; did you mean `readout.read_noise_e`?"),
         ("source: nowhere", "observer: me", "unknown key `observer`"),
-        ("{file: qe.csv}", "{file: qe.csv, color: R}", "`response` has an unknown key `quantum_efficiency`; remove it"),
+        (
+            "{file: qe.csv}",
+            "{file: qe.csv, color: R}",
+            "`response.quantum_efficiency` has an unknown key `color`; did you mean `column`?",
+        ),
+        (
+            "  quantum_efficiency:",
+            "  qe:",
+            "unknown key `response.qe`; here it is `quantum_efficiency`, electrons per photon, within `response`",
+        ),
+        (
+            "{file: qe.csv}",
+            "{file: qe.csv, gain: 2}",
+            "`response.quantum_efficiency` has an unknown key `gain`; remove it",
+        ),
         ("sensor/2", "sensor/1", "`readout` belongs to the schema `cyanometer-sensor/2`; name that one"),
         ("sensor/2", "sensor/3", "schema is `cyanometer-sensor/3`, not `cyanometer-sensor/2` or `cyanometer-sensor/1`"),
         (

@@ -7,6 +7,13 @@ use crate::formats::foreign::number_complaint;
 use crate::names::nearest;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
+use std::path::Path;
+
+/// The word that begins as an argument with one dash does, where a file is called so.
+fn of_file<'a>(argument: &str, words: &'a [String]) -> Option<&'a str> {
+    let is_one = |word: &&String| word.starts_with(argument) && !word.starts_with("--") && Path::new(word).is_file();
+    words.iter().find(is_one).map(String::as_str)
+}
 
 /// clap's complaint in one line about the arguments of `command`, which are these words.
 pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, words: &[String]) -> String {
@@ -23,6 +30,7 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
             let hint = in_words(meant(&argument, command, words).or_else(|| near_option(&argument, command)));
             let hint = output_hint(&argument, command, words).map_or(hint, |output| format!("; {output}"));
             let hint = in_quotes(&argument, command, words).map_or(hint, |quoted| format!("; write {quoted}"));
+            let hint = of_file(&argument, words).map_or(hint, |file| format!("; for the file write `./{file}`"));
             let hint = if argument.strip_prefix("--") == Some("list") { LISTS_OF_DATA.to_owned() } else { hint };
             let argument = one_dash(&argument, words).unwrap_or(&argument);
             format!("unknown option or extra argument `{argument}`{hint}")

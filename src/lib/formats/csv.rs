@@ -5,14 +5,16 @@
 //! nm. What parts cells and what is a comment, `delimited` tells.
 
 use super::cells::{Cells, MAX_COLUMNS, Text, numeric, unpacked};
-use super::delimited;
+use super::cut_off;
+use super::delimited::{self, MAX_COMMENTS};
+use super::described::Columns;
 use super::factors::doubt_of_factor;
 use super::foreign::{csv_complaint, line_of};
 use super::misread::{self, is_units};
 use super::quantities;
 use super::radiance_unit::{self, Brightness, FileSays, times_white};
 use super::register;
-use super::remarks::{Comments, MAX_COMMENTS};
+use super::remarks::Comments;
 use super::spectral_heading::{self, Wavelengths, check_first_column, is_behind_index, refuse_index, without_first};
 use super::thousands::Points;
 use super::uncertainties;
@@ -76,6 +78,8 @@ pub struct SpectralTable {
     counted_in: WavelengthUnit,
     /// Whether nothing says what its columns are.
     is_bare: bool,
+    /// The numbers that comments give its curves, where they describe all columns.
+    numbers: Option<Vec<usize>>,
     /// The curves whose points may be marks of thousands.
     points: Points,
 }
@@ -121,33 +125,31 @@ impl SpectralTable {
         let Cells { numbers, labels, spoiled, points } = cells;
         misread::check_shape(name, &numbers, has_header)?;
         let (width, values) = (numbers.ncols(), numbers.slice(ndarray::s![.., 1..]));
-        let named_in_comment = if has_header { None } else { spectral_heading::in_comment(&text.decoded, width) };
+        let heading = Some(&first).filter(|_| has_header);
+        let said = Columns::of(name, &text.decoded, if by_rows { 0 } else { width }, heading, units.as_ref())?;
         let unit_of_heads = heads.as_ref().and_then(|heads| heads.unit);
         let of_heads = heads.as_ref().and_then(|heads| heads.quantity.clone());
         let (wavelengths, columns, values) = match heads {
             Some(heads) => (heads.values, labels, values.to_owned()),
-            None => {
-                let said = if has_header { Some(without_first(&first)) } else { named_in_comment.clone() };
-                (numbers.column(0).to_vec(), names(said.as_ref(), width), values.t().to_owned())
-            }
+            None => (numbers.column(0).to_vec(), said.names(width), values.t().to_owned()),
         };
-        let comments = Comments::of(&text.decoded);
+        let comments = Comments::of(&text.decoded, said.are_described());
         doubt_of_factor(&text.decoded).into_iter().for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
         let of_rows = of_heads.or_else(|| unit_of_heading(&first[0]).filter(|_| by_rows));
-        let headings = headings(&columns, units.as_ref(), of_rows.as_ref());
+        let headings = headings(&columns, units.as_ref(), &said, of_rows.as_ref());
         let heading = units.as_ref().unwrap_or(&first).get(0).filter(|cell| has_header && !is_of_radiance(cell));
+        let stated = |said: Option<&str>| wavelength_unit(said).map_err(|problem| Error::format(name, problem));
         let unit = match unit_of_heads {
             Some(unit) => Some(unit),
-            None => wavelength_unit(heading).map_err(|problem| Error::format(name, problem))?.or(comments.wavelength),
+            None => stated(heading)?.or(stated(said.first())?).or(comments.wavelength),
         };
-        if unit.is_none() && !by_rows {
+        if !(by_rows || unit.is_some() && said.is_first_named()) {
             refuse_index(name, &numbers)?;
         }
         let are_swapped = || spectral_heading::are_swapped(&numbers).filter(|_| unit.is_none() && !by_rows);
         let (wavelength_nm, values) = in_nm(wavelengths, values, unit)
             .map_err(|problem| Error::format(name, are_swapped().unwrap_or(problem)))?;
-        let counted_in = unit.unwrap_or(WavelengthUnit::Nanometer);
-        let is_bare = !has_header && named_in_comment.is_none();
+        let numbers = said.are_described().then(|| (2..=columns.len() + 1).collect());
         let Comments { units: remarks, other_quantity, .. } = comments;
         let table = Self {
             name: name.to_owned(),
@@ -158,8 +160,9 @@ impl SpectralTable {
             headings,
             remarks,
             other_quantity,
-            counted_in,
-            is_bare,
+            counted_in: unit.unwrap_or(WavelengthUnit::Nanometer),
+            is_bare: said.are_bare(),
+            numbers,
             points,
         };
         Ok(table.without_uncertainties())
@@ -176,6 +179,7 @@ impl SpectralTable {
             spoiled: self.spoiled.iter().filter_map(|(index, said)| Some((place(index)?, said.clone()))).collect(),
             headings: kept.iter().map(|index| self.headings[*index].clone()).collect(),
             points: self.points.kept(&kept),
+            numbers: self.numbers.map(|numbers| kept.iter().map(|index| numbers[*index]).collect()),
             ..self
         }
     }
@@ -213,7 +217,10 @@ impl SpectralTable {
         // Of columns that a comment names, too.
         let counted = || {
             let number = column.to_ascii_lowercase().strip_prefix("column")?.parse::<usize>().ok()?;
-            number.checked_sub(1).filter(|place| *place < self.columns.len())
+            match &self.numbers {
+                Some(numbers) => numbers.iter().position(|of| *of == number),
+                None => number.checked_sub(1).filter(|place| *place < self.columns.len()),
+            }
         };
         // The name of `sky (mW m-2 sr-1 nm-1)` is `sky`, where no other column's is.
         let bare = || {
@@ -222,8 +229,11 @@ impl SpectralTable {
         };
         exact.or_else(bare).or_else(counted).ok_or_else(|| {
             let some: Vec<&str> = self.columns.iter().take(8).map(String::as_str).collect();
-            let all = self.columns.len();
-            let by_number = match column.parse::<usize>().is_ok_and(|place| (1..=all).contains(&place)) {
+            let is_one = |number: usize| match &self.numbers {
+                Some(numbers) => numbers.contains(&number),
+                None => (1..=self.columns.len()).contains(&number),
+            };
+            let by_number = match column.parse().is_ok_and(is_one) {
                 true => format!("; by its place it is column{column}"),
                 false => String::new(),
             };
@@ -304,7 +314,11 @@ impl SpectralTable {
         }
         let of_uvspec =
             self.uvspec().map(|_| format!("{}: {like_uvspec}; it is `{}`", self.name, misread::UVSPEC[index]));
-        let says = FileSays { name: &self.name, heading, remarks: &self.remarks, place };
+        // Of several columns a refusal names the one.
+        let is_other = matches!(heading, Some(Stated::Other { kind, .. }) if kind.conversion().is_some());
+        let of_column = format!("{}: column `{}`", self.name, self.columns[index]);
+        let name = if is_other && self.columns.len() > 1 { &of_column } else { &self.name };
+        let says = FileSays { name, heading, remarks: &self.remarks, place };
         let (unit, assumed) = radiance_unit::settle(says, given)?;
         let samples = self.values.row(index).into_iter().zip(&self.wavelength_nm);
         let brightest = samples.map(|(value, nm)| value * unit.in_w_per_cm2_sr_nm(*nm)).fold(0.0, f64::max);
@@ -369,8 +383,8 @@ impl SpectralTable {
         }
     }
 
-    /// A warning of values below zero in a curve of radiances, if there are any, or of nothing but zeros.
-    pub fn negative(&self, index: usize) -> Option<String> {
+    /// A warning of values in a curve of radiances that no light has: below zero, nothing but zeros, or cut off to zeros.
+    pub fn doubt_of_values(&self, index: usize) -> Option<String> {
         let values = self.values.row(index);
         let count = values.iter().filter(|value| **value < 0.0).count();
         let least = values.iter().copied().fold(0.0, f64::min);
@@ -378,10 +392,13 @@ impl SpectralTable {
         if values.iter().all(|value| *value == 0.0) {
             return Some(format!("{}: {which}all radiances are 0: is it the right column?", self.name));
         }
-        (count > 0).then(|| {
-            let all = values.len();
-            format!("{}: {which}{count} of {all} radiances are below 0, down to {least}, which no light is", self.name)
-        })
+        if count > 0 {
+            let (name, all) = (&self.name, values.len());
+            return Some(format!(
+                "{name}: {which}{count} of {all} radiances are below 0, down to {least}, which no light is"
+            ));
+        }
+        cut_off::doubt(&self.wavelength_nm, &values.to_vec()).map(|doubt| format!("{}: {which}{doubt}", self.name))
     }
 }
 
@@ -431,7 +448,12 @@ fn heading_wavelengths(name: &str, text: &Text, heading: &StringRecord) -> Resul
 
 /// What headings say about the unit of each curve: those of its column in a row of units and in the header; where curves are
 /// rows, that of the row, or what the header says `of_rows`.
-fn headings(columns: &[String], units: Option<&StringRecord>, of_rows: Option<&Stated>) -> Vec<Option<Stated>> {
+fn headings(
+    columns: &[String],
+    units: Option<&StringRecord>,
+    said: &Columns,
+    of_rows: Option<&Stated>,
+) -> Vec<Option<Stated>> {
     let unit_below = |index: usize, column: &str| {
         let cell = units?.get(index + 1)?;
         let both = unit_of_heading(&format!("{column} ({cell})"));
@@ -440,17 +462,10 @@ fn headings(columns: &[String], units: Option<&StringRecord>, of_rows: Option<&S
         if is_contradiction { both } else { alone() }
     };
     let one = |(index, column): (usize, &String)| {
-        unit_below(index, column).or_else(|| unit_of_heading(column)).or_else(|| of_rows.cloned())
+        let of_column = || unit_of_heading(column).or_else(|| said.unit_of(index));
+        unit_below(index, column).or_else(of_column).or_else(|| of_rows.cloned())
     };
     columns.iter().enumerate().map(one).collect()
-}
-
-/// The names of so many columns less that of wavelengths: as they are said, or numbers from 1.
-fn names(said: Option<&StringRecord>, width: usize) -> Vec<String> {
-    match said {
-        Some(said) => said.iter().map(ToOwned::to_owned).collect(),
-        None => (1..width).map(|column| format!("column{column}")).collect(),
-    }
 }
 
 /// Whether a heading is that of a quantity other than wavelength.
@@ -542,9 +557,11 @@ mod tests {
         };
         let text = "nm;L\r\n400;0,5\r\n410;1,25\r\n420;3\r\n";
         let mut tables: Vec<Vec<u8>> = vec![utf16(u16::to_le_bytes, text), utf16(u16::to_be_bytes, text)];
+        tables.extend([tables[0][2..].to_vec(), tables[1][2..].to_vec()]);
         tables.extend(
             [
                 text,
+                "nm;L\r\n400;0,5\r\n410;1,25\r\n420;3\r\n\u{1A}",
                 "nm\tL\n400,0\t0,5\n410,0\t1,25\n420,0\t3,0\n",
                 "\"400,0\",\"0,5\"\n\"410,0\",\"1,25\"\n\"420,0\",\"3,0\"\n",
                 "wavelength (nm, vacuum)\tL\n400\t0,5\n410\t1,25\n420\t3\n",
@@ -960,7 +977,10 @@ mod tests {
         }
         assert!(complaint("nu,L\n14000,1\n25000,2\n").contains("`wavenumber_cm-1`"));
         let table = SpectralTable::parse("t", b"nm,a,b\n400,1,1\n500,1,-2\n").unwrap();
-        assert_eq!(table.negative(0), None);
-        assert_eq!(table.negative(1).unwrap(), "t: `b`: 1 of 2 radiances are below 0, down to -2, which no light is");
+        assert_eq!(table.doubt_of_values(0), None);
+        assert_eq!(
+            table.doubt_of_values(1).unwrap(),
+            "t: `b`: 1 of 2 radiances are below 0, down to -2, which no light is"
+        );
     }
 }

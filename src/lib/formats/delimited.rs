@@ -6,6 +6,8 @@
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 
+/// So many comments are searched for what they say.
+pub(super) const MAX_COMMENTS: usize = 1000;
 /// So many rows are looked at for what parts their cells.
 const ROWS_LOOKED_AT: usize = 16;
 /// What may part cells, the likeliest first: a comma may be that of decimals, a blank that of words.
@@ -115,28 +117,45 @@ pub fn decimal(cell: &str) -> Option<f64> {
     has_one.then(|| number(&cell.replacen(',', ".", 1))).flatten()
 }
 
-/// The text of a file, without its byte order mark: UTF-8, UTF-16, or else Latin-1, of which numbers and most units are the same.
+/// The text of a file, without its byte order mark and the mark of DOS that ends it: UTF-8, UTF-16, or else Latin-1, of which numbers and
+/// most units are the same.
 ///
 /// # Errors
 ///
 /// [`Error::Format`] for UTF-16 that is damaged.
 pub fn decoded<'a>(name: &str, bytes: &'a [u8]) -> Result<Cow<'a, str>> {
-    let utf16 = |unit: fn([u8; 2]) -> u16| {
-        let (pairs, odd) = bytes[2..].as_chunks();
-        let text = char::decode_utf16(pairs.iter().map(|pair| unit(*pair))).collect::<std::result::Result<String, _>>();
-        let text = text.ok().filter(|_| odd.is_empty());
-        text.ok_or_else(|| Error::format(name, "it is UTF-16 text, but damaged; save it as UTF-8"))
+    const END_OF_DOS: u8 = 0x1A;
+    let utf16 = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
+        of_utf16(bytes, unit).ok_or_else(|| Error::format(name, "it is UTF-16 text, but damaged; save it as UTF-8"))
     };
-    let text: Cow<'a, str> = match bytes {
-        [0xFF, 0xFE, ..] => utf16(u16::from_le_bytes)?.into(),
-        [0xFE, 0xFF, ..] => utf16(u16::from_be_bytes)?.into(),
-        _ => match std::str::from_utf8(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)) {
-            Ok(text) => text.into(),
-            Err(_) => bytes.iter().copied().map(char::from).collect::<String>().into(),
-        },
+    // Two characters of ASCII, without a mark.
+    let unmarked = match bytes {
+        [0, 1..=0x7F, 0, 1..=0x7F, ..] => of_utf16(bytes, u16::from_be_bytes),
+        [1..=0x7F, 0, 1..=0x7F, 0, ..] => of_utf16(bytes, u16::from_le_bytes),
+        _ => None,
+    };
+    let text: Cow<'a, str> = match (bytes, unmarked) {
+        ([0xFF, 0xFE, text @ ..], _) => utf16(text, u16::from_le_bytes)?.into(),
+        ([0xFE, 0xFF, text @ ..], _) => utf16(text, u16::from_be_bytes)?.into(),
+        (_, Some(text)) => text.into(),
+        (_, None) => {
+            let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+            let bytes = bytes.strip_suffix(&[END_OF_DOS]).unwrap_or(bytes);
+            match std::str::from_utf8(bytes) {
+                Ok(text) => text.into(),
+                Err(_) => bytes.iter().copied().map(char::from).collect::<String>().into(),
+            }
+        }
     };
     let has_old_ends = text.contains('\r') && !text.contains('\n');
     Ok(if has_old_ends { text.replace('\r', "\n").into() } else { text })
+}
+
+/// The text of units of UTF-16, if they are that throughout.
+fn of_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
+    let (pairs, odd) = bytes.as_chunks();
+    let text = char::decode_utf16(pairs.iter().map(|pair| unit(*pair))).collect::<std::result::Result<String, _>>();
+    text.ok().filter(|_| odd.is_empty())
 }
 
 /// The lines that stand above the heading of a table, the first and the last, and that of the heading, from 1: the last line before

@@ -1,9 +1,6 @@
 //! Comments of tables that tell of a factor, which no program applies.
 
-use super::delimited;
-
-/// So many comments are searched.
-const MAX_COMMENTS: usize = 1000;
+use super::delimited::{self, MAX_COMMENTS};
 
 /// What says that values are to be multiplied or divided, or that those of the file were; `multiplied by` alone tells of a step before.
 const WORDS: [&str; 17] = [

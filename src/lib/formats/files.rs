@@ -101,7 +101,11 @@ pub fn near_file(path: &Path) -> Option<String> {
     names.sort_unstable();
     let is_same_stem = |known: &str| Path::new(known).file_stem() == path.file_stem();
     let farthest = |known: &str| if is_same_stem(known) { ENDING } else { known.len().min(typed.len()) / LETTERS };
-    let near = nearest(typed, names.iter().map(String::as_str), farthest)?;
+    // A frame with metadata beside it rather than a picture of it.
+    let has_metadata = |name: &str| is_same_stem(name) && names.binary_search(&format!("{name}.yaml")).is_ok();
+    let frames: Vec<&str> = names.iter().map(String::as_str).filter(|name| has_metadata(name)).collect();
+    let known = if frames.is_empty() { names.iter().map(String::as_str).collect() } else { frames };
+    let near = nearest(typed, known, farthest)?;
     Some(path.with_file_name(near).display().to_string())
 }
 
@@ -126,6 +130,10 @@ pub(super) mod tests {
         let wanted = directory.path().join("clear_zenith.csv").display().to_string();
         assert_eq!(told("clear_zenit.csv"), Some(wanted));
         assert!(["a.ex", "a.tiff"].iter().all(|name| told(name).unwrap().ends_with("a.exr")));
+        for name in ["m.png", "m.tiff", "m.tiff.yaml"] {
+            std::fs::write(directory.path().join(name), "").unwrap();
+        }
+        assert!(told("m.exr").unwrap().ends_with("m.tiff"));
         // One of the same stem, though another's name is nearer.
         std::fs::write(directory.path().join("clear"), "").unwrap();
         assert!(told("clear_zenith").unwrap().ends_with("clear_zenith.csv"));

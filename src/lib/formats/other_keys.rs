@@ -1,9 +1,12 @@
 //! What other programs and data sheets call the keys of sensor files.
 
+use crate::error::{Error, Result};
+use crate::names::nearest;
 use crate::units::written;
+use serde_yaml::Mapping;
 
 /// Their names, the key here, and how the two stand to each other.
-const OTHER_KEYS: [(&str, &str, &str); 16] = [
+const OTHER_KEYS: [(&str, &str, &str); 22] = [
     ("e_per_adu", "adu_per_e", "its inverse"),
     ("gain_e_per_adu", "adu_per_e", "its inverse"),
     ("egain", "adu_per_e", "its inverse"),
@@ -20,6 +23,12 @@ const OTHER_KEYS: [(&str, &str, &str); 16] = [
     ("adc_bits", "bits", "bits of the converter"),
     ("dsnu", "dsnu_e", "in e-"),
     ("offset", "bias_adu", "in ADU"),
+    ("qe", "quantum_efficiency", "electrons per photon, within `response`"),
+    ("spectral_response", "relative_response", "on any scale, within `response`"),
+    ("responsivity", "relative_response", "on any scale, within `response`"),
+    ("sensitivity", "relative_response", "on any scale, within `response`"),
+    ("ssf", "relative_response", "on any scale, within `response`"),
+    ("ir_filter", "cover_glass", "its transmittance, within `response`"),
 ];
 
 /// Endings of names for units that no key here has.
@@ -39,6 +48,17 @@ const OTHER_UNITS: [&str; 14] = [
     "_us",
     "_c",
 ];
+
+/// Refuses keys of the mapping at a known key that are not written back; `of_curve` are those that the file of a curve of the response
+/// has.
+pub(super) fn check_within(name: &str, path: &str, unknown: &Mapping, of_curve: &[&str]) -> Result<()> {
+    let known = if path.starts_with("response.") { of_curve } else { &[] };
+    let mut keys = unknown.keys().map(|key| key.as_str().unwrap_or("?"));
+    let Some(key) = keys.find(|key| !known.contains(key)) else { return Ok(()) };
+    let meant = nearest(key, known.iter().copied(), |_| key.len().div_ceil(2));
+    let advice = meant.map_or_else(|| "remove it".to_owned(), |meant| format!("did you mean `{meant}`?"));
+    Err(Error::format(name, format!("`{path}` has an unknown key `{key}`; {advice}")))
+}
 
 /// What another's key is called among these, and what it means there.
 pub(super) fn here(typed: &str, known: &[String]) -> Option<String> {

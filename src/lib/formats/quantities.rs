@@ -34,7 +34,8 @@ pub(super) fn of_light(column: &str, stated: &Stated) -> Option<String> {
         | OtherUnit::Emissivity
         | OtherUnit::Magnitude
         | OtherUnit::Depth
-        | OtherUnit::Responsivity => false,
+        | OtherUnit::Responsivity
+        | OtherUnit::PerReading => false,
     };
     let what = match kind {
         OtherUnit::Irradiance => OtherUnit::PerFrequency.in_words(),

@@ -1,6 +1,7 @@
 //! What comments of tables of spectra say about units.
 
-use super::delimited;
+use super::delimited::{self, MAX_COMMENTS};
+use super::described;
 use crate::units::{OtherUnit, Stated, WavelengthUnit, unit_of_heading, units_in};
 
 /// What comments say about units.
@@ -12,33 +13,71 @@ pub(super) struct Comments {
 }
 
 impl Comments {
-    /// Those of a table.
-    pub(super) fn of(text: &str) -> Self {
+    /// Those of a table; what comments say of one column is none of it where they have `described_each` so.
+    pub(super) fn of(text: &str, described_each: bool) -> Self {
         let mut found = Self::default();
         let (mut alone, mut described) = (None, 0);
         let mut speaks_of_radiance = false;
         for line in delimited::comments(text).take(MAX_COMMENTS) {
+            found.wavelength = found.wavelength.or_else(|| wavelength(line));
+            if described_each && described::column(line).is_some() {
+                continue;
+            }
             let other = other_quantity(line);
             // A radiance beside a factor is none.
             let is_scaled = matches!(&other, Some(Stated::Other { kind: OtherUnit::BesideFactor, .. }));
             found.units.extend(units_in(line).into_iter().filter(|_| !is_scaled));
             found.other_quantity = found.other_quantity.or(other);
-            described += usize::from(column_described(line).is_some());
+            described += usize::from(is_other_column(line));
             match quantity_alone(line).filter(|_| alone.is_none()) {
                 Some(quantity) => alone = Some(quantity),
                 None => speaks_of_radiance |= words(line).iter().any(|word| word.starts_with("radiance")),
             }
-            let counts = |clause: &&str| {
-                ["wavelength", "wavenumber", "photon energ"].iter().any(|word| clause.to_lowercase().contains(word))
-            };
-            let mut clauses = line.split([',', ';']).filter(counts);
-            let unit = clauses.find_map(|clause| WavelengthUnit::of_heading(clause.trim()).ok().flatten());
-            found.wavelength = found.wavelength.or(unit);
         }
         // What describes one column of several is not the quantity of all.
         found.other_quantity = found.other_quantity.or(alone.filter(|_| described < 2 && !speaks_of_radiance));
         found
     }
+}
+
+/// The unit that a comment says wavelengths have; none that it speaks of in passing: `wavelength accuracy 0.5 cm-1`.
+fn wavelength(comment: &str) -> Option<WavelengthUnit> {
+    const COUNTED: [&str; 3] = ["wavelength", "wavenumber", "photon energ"];
+    let counts =
+        |clause: &&str| COUNTED.iter().any(|word| clause.to_lowercase().contains(word)) && !is_in_passing(clause);
+    let mut clauses = comment.split([',', ';']).filter(counts);
+    clauses.find_map(|clause| WavelengthUnit::of_heading(clause.trim()).ok().flatten())
+}
+
+/// Whether a clause about wavelengths is about how well they are known, how far apart, or what they were.
+fn is_in_passing(clause: &str) -> bool {
+    /// What such words begin with.
+    const ABOUT: [&str; 20] = [
+        "uncertain",
+        "accura",
+        "precis",
+        "resol",
+        "error",
+        "repeatab",
+        "reproduc",
+        "stab",
+        "drift",
+        "shift",
+        "offset",
+        "calibrat",
+        "fwhm",
+        "bandwidth",
+        "width",
+        "step",
+        "spacing",
+        "interval",
+        "sampling",
+        "correct",
+    ];
+    let words = words(clause);
+    let has = |wanted: &[&str]| words.iter().any(|word| wanted.contains(&word.as_str()));
+    let was_another = has(&["from"]) && has(&["converted", "computed", "calculated", "derived", "transformed"]);
+    was_another && !has(&["to", "into"]) || words.iter().any(|word| ABOUT.iter().any(|begin| word.starts_with(begin)))
 }
 
 /// The quantity that a comment such as `Unit: %` or `units of values = counts` states, where it is no spectral radiance.
@@ -123,10 +162,8 @@ const FILLERS: [&str; 31] = [
 /// Reflectance`; none that is a radiance, or that has a value there.
 fn quantity_alone(comment: &str) -> Option<Stated> {
     let stated = unit_of_heading(comment).filter(is_other)?;
-    let mut left = match column_described(comment) {
-        Some(column) => comment.replacen(&column, "", 1),
-        None => comment.to_owned(),
-    };
+    let described = described::column(comment).filter(|_| is_other_column(comment));
+    let mut left = described.map_or(comment, |(_, said)| said).to_owned();
     for unit in units_in(comment) {
         if let Stated::Other { text, .. } = unit {
             // `of an irradiance of 3 W m-2`
@@ -142,12 +179,9 @@ fn quantity_alone(comment: &str) -> Option<Stated> {
     is_alone.then_some(stated)
 }
 
-/// The number of the column, behind that of wavelengths, that a comment begins with: `Column 2: radiance`.
-fn column_described(comment: &str) -> Option<String> {
-    let words = words(comment);
-    let [first, number, ..] = words.as_slice() else { return None };
-    let is_other = number.parse::<usize>().is_ok_and(|number| number > 1);
-    (["column", "col"].contains(&first.as_str()) && is_other).then(|| number.clone())
+/// Whether a comment describes a column behind that of wavelengths: `Column 2: radiance`.
+fn is_other_column(comment: &str) -> bool {
+    described::column(comment).is_some_and(|(number, _)| number > 1)
 }
 
 /// The words of a comment, in small letters.
@@ -156,16 +190,36 @@ fn words(comment: &str) -> Vec<String> {
     words.map(str::to_lowercase).collect()
 }
 
-/// So many comments are searched for units.
-pub(super) const MAX_COMMENTS: usize = 1000;
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
+    fn what_is_said_of_wavelengths_in_passing_is_no_unit_of_theirs() {
+        let unit = |comment: &str| Comments::of(&format!("# {comment}\nwavelength,L\n400,1\n"), false).wavelength;
+        for comment in [
+            "wavelength uncertainty 0.002 um",
+            "wavelength accuracy 0.5 cm-1",
+            "wavelength resolution 20 cm-1",
+            "wavelengths converted from um",
+            "wavelength calibrated with Hg lamp (A)",
+            "wavelength step 0.001 um",
+        ] {
+            assert_eq!(unit(comment), None, "{comment}");
+        }
+        for comment in [
+            "wavelength in um",
+            "wavelengths converted from nm to um",
+            "wavelength accuracy 0.5 nm, wavelengths in um",
+            "wavelength unit: um",
+        ] {
+            assert_eq!(unit(comment), Some(WavelengthUnit::Micrometer), "{comment}");
+        }
+    }
+
+    #[test]
     fn comments_that_name_a_quantity_and_nothing_else_count() {
-        let other = |text: &str| Comments::of(text).other_quantity;
+        let other = |text: &str| Comments::of(text, false).other_quantity;
         for text in [
             "# irradiance in mW/(m2 nm)\nnm,value\n400,1\n",
             "# spectral irradiance, mW m-2 nm-1\n400,1\n",

@@ -6,6 +6,7 @@ use super::wavelengths::check_nm;
 use crate::cfa::Class;
 use crate::error::{Error, Result};
 use crate::spectrum::{Curve, not_in_order};
+use crate::units::{OtherUnit, Stated};
 
 /// Fewer wavelengths follow no filter of a camera.
 const LEAST_SAMPLES: usize = 10;
@@ -25,6 +26,8 @@ pub struct ResponseTable {
     pub classes: [Curve; 3],
     /// What may mislead, each a warning.
     pub doubts: Vec<String>,
+    /// The heading that says that it counts energy: `R (A/W)`.
+    pub of_energy: Option<String>,
 }
 
 impl ResponseTable {
@@ -58,6 +61,9 @@ impl ResponseTable {
             *class = table.curve_at(place)?;
         }
         checked.doubts.extend(told);
+        let is_per_watt =
+            |place: &usize| matches!(table.stated(*place), Some(Stated::Other { kind: OtherUnit::Responsivity, .. }));
+        checked.of_energy = places.iter().find(|place| is_per_watt(place)).map(|place| table.columns[*place].clone());
         Ok(checked)
     }
 
@@ -107,7 +113,7 @@ impl ResponseTable {
         doubts.extend(exchanged(&wavelength_nm, &values));
         let curve = |values| Curve::new(wavelength_nm.clone(), values).map_err(|problem| Error::format(name, problem));
         let [red, green, blue] = values;
-        Ok(Self { about: None, classes: [curve(red)?, curve(green)?, curve(blue)?], doubts })
+        Ok(Self { about: None, classes: [curve(red)?, curve(green)?, curve(blue)?], doubts, of_energy: None })
     }
 }
 

@@ -267,7 +267,7 @@ fn counts_rows(first: ArrayView1<f64>) -> bool {
         && first.windows(2).into_iter().all(|pair| pair[1] == pair[0] + 1.0)
 }
 
-/// A complaint of a table without a unit of wavelengths whose first column counts its rows.
+/// A complaint of a table whose first column counts its rows.
 pub(super) fn refuse_index(name: &str, numbers: &Array2<f64>) -> Result<()> {
     if !counts_rows(numbers.column(0)) {
         return Ok(());
@@ -316,10 +316,19 @@ pub(super) fn in_comment(text: &str, width: usize) -> Option<StringRecord> {
         by_mark(';'),
         by_mark(','),
         delimited::bracketed(comment),
-        comment.split_whitespace().collect(),
+        comment.split_whitespace().filter(|_| !is_sentence(comment)).collect(),
     ];
-    let cells = parted.into_iter().find(|cells| cells.len() == width && is_of_wavelengths(cells[0]))?;
+    let are_names =
+        |cells: &Vec<&str>| cells.len() == width && cells.first().is_some_and(|cell| is_of_wavelengths(cell));
+    let cells = parted.into_iter().find(are_names)?;
     Some(cells.into_iter().skip(1).collect())
+}
+
+/// Whether the words of a comment tell something: `wavelength unit: nm`, `wavelength in nm`.
+fn is_sentence(comment: &str) -> bool {
+    const VERBS: [&str; 12] = ["in", "is", "are", "unit", "units", "of", "from", "to", "by", "for", "with", "and"];
+    let is_told = |word: &str| word.ends_with([':', '=', '.']) || VERBS.contains(&word.to_lowercase().as_str());
+    comment.split_whitespace().any(is_told)
 }
 
 /// A record without its first cell.

@@ -7,7 +7,9 @@ use super::settings::{self, Settings};
 use super::{yaml_guard, yaml_writer};
 use crate::analysis::characterization::CameraMatrix;
 use crate::camera::readout::ReadOut;
-use crate::camera::sensor::{FLAT_SENSOR_SCHEMA, FlatSensor, Provenance, ResponseFiles, SENSOR_SCHEMA, Sensor};
+use crate::camera::sensor::{
+    CurveFile, FLAT_SENSOR_SCHEMA, FlatSensor, Provenance, ResponseFiles, SENSOR_SCHEMA, Sensor,
+};
 use crate::error::{Error, Result};
 use crate::metadata::{METADATA_SCHEMA, Metadata};
 use crate::names::{Named, nearest};
@@ -328,12 +330,19 @@ fn parse_made<T: DeserializeOwned + Serialize>(name: &str, raw: &Mapping, parts:
 /// Refuses keys that are not written back, unless they are known.
 fn check_unknown(name: &str, unknown: &Mapping, parts: &[(&str, Keys)]) -> Result<()> {
     // A key that is not written back may be one of those that are left out where they are 0.
+    let of_curve = field_names::<CurveFile>();
     let is_known = |key: &str, inner: &str| parts.iter().any(|(part, fields)| *part == key && fields.contains(&inner));
     for (key, inner) in unknown {
         let key = key.as_str().unwrap_or("?");
-        let all = inner.as_mapping().into_iter().flatten().map(|(inner, value)| (inner.as_str().unwrap_or("?"), value));
-        if let Some((inner, _)) = all.into_iter().find(|(inner, value)| value.is_mapping() || !is_known(key, inner)) {
-            return Err(Error::format(name, format!("`{key}` has an unknown key `{inner}`; remove it")));
+        for (inner, value) in inner.as_mapping().into_iter().flatten() {
+            let inner = inner.as_str().unwrap_or("?");
+            match value.as_mapping() {
+                Some(nested) if is_known(key, inner) => {
+                    other_keys::check_within(name, &format!("{key}.{inner}"), nested, of_curve)?
+                }
+                _ if is_known(key, inner) => {}
+                _ => return Err(Error::format(name, format!("`{key}` has an unknown key `{inner}`; remove it"))),
+            }
         }
     }
     Ok(())

@@ -34,6 +34,18 @@ pub(super) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(|c| advance(glyph(c))).sum::<f64>() * size / f64::from(FACE.units_per_em())
 }
 
+/// A text without as much of its middle as makes it too wide, which dots stand for: names differ at their ends.
+pub(super) fn shortened(text: &str, size: f64, most: f64) -> String {
+    let letters: Vec<char> = text.chars().collect();
+    let without = |left_out: usize| -> String {
+        let begin = (letters.len() - left_out).div_ceil(2);
+        let [head, tail] = [&letters[..begin], &letters[begin + left_out..]];
+        head.iter().chain(&['…']).chain(tail).collect()
+    };
+    let shorter = || (1..letters.len()).map(without).find(|text| width(text, size) <= most);
+    if width(text, size) <= most { text.to_owned() } else { shorter().unwrap_or_else(|| "…".to_owned()) }
+}
+
 /// The words of a text in lines that are no wider; words that alone are wider are parted.
 pub(super) fn lines(text: &str, size: f64, most: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
@@ -137,6 +149,14 @@ mod tests {
         }
         assert_eq!(lines(text, 12.0, 5000.0), [text]);
         assert!(lines("", 12.0, 10.0).is_empty());
+    }
+
+    #[test]
+    fn names_that_are_too_long_lose_their_middle() {
+        let name = "a_very_long_layer_name.channel_1";
+        let short = shortened(name, 12.0, 100.0);
+        assert!(width(&short, 12.0) <= 100.0 && short.starts_with("a_ve") && short.ends_with("el_1"), "{short}");
+        assert_eq!([shortened(name, 12.0, 1000.0), shortened(name, 12.0, 1.0)], [name.to_owned(), "…".to_owned()]);
     }
 
     #[test]

@@ -52,6 +52,8 @@ impl Covered {
 /// What a legend says, and how large it is.
 pub(super) struct Legend<'a> {
     named: Vec<&'a Series>,
+    /// Their names, as long as there is room for.
+    names: Vec<String>,
     /// Of each column.
     widths: Vec<f64>,
     rows: usize,
@@ -63,14 +65,18 @@ impl<'a> Legend<'a> {
         let is_listed = |series: &&Series| !series.name.is_empty() && is_seen(&series.marks, x, y);
         let named: Vec<&Series> = panel.series.iter().filter(is_listed).collect();
         let rows = named.len();
-        (rows > 0).then(|| Self { widths: widths(&named, rows), named, rows })
+        let names: Vec<String> = named.iter().map(|series| series.name.clone()).collect();
+        (rows > 0).then(|| Self { widths: widths(&names, rows), named, names, rows })
     }
 
-    /// The same in as many columns as have room, all about equally long.
-    pub fn spread(self, width: f64) -> Self {
-        let fits = |rows: &usize| widths(&self.named, *rows).iter().sum::<f64>() <= width;
+    /// The same in as many columns as have room in a width, all about equally long, and with names that are no longer than `most` has
+    /// room for.
+    pub fn spread(self, width: f64, most: f64) -> Self {
+        let short = |name: &String| font::shortened(name, TEXT, most - BESIDE_NAME);
+        let names: Vec<String> = self.names.iter().map(short).collect();
+        let fits = |rows: &usize| widths(&names, *rows).iter().sum::<f64>() <= width;
         let rows = (1..self.rows).find(fits).unwrap_or(self.rows);
-        Self { widths: widths(&self.named, rows), rows, ..self }
+        Self { widths: widths(&names, rows), names, rows, ..self }
     }
 
     /// Width and height.
@@ -105,13 +111,13 @@ impl<'a> Legend<'a> {
             Ink { rgb: [0xff; 3], opacity: 0.88 },
             Stroke { ink: Ink { rgb: [0; 3], opacity: 0.25 }, width: 1.0, dashes: &[] },
         );
-        for (index, series) in self.named.iter().enumerate() {
+        for (index, (series, name)) in self.named.iter().zip(&self.names).enumerate() {
             let (column, row) = (index / self.rows, index % self.rows);
             let middle = top + 4.0 + (row as f64 + 0.5) * LINE;
             let left = left + 8.0 + self.widths[..column].iter().sum::<f64>();
             draw_swatch(drawing, series, [left, middle], look);
             let baseline = [left + SWATCH + 8.0, middle + MIDDLE * TEXT];
-            write(drawing, &series.name, baseline, TEXT, Anchor::Start);
+            write(drawing, name, baseline, TEXT, Anchor::Start);
         }
     }
 }
@@ -153,10 +159,13 @@ fn crosses(from: Point, to: Point) -> bool {
     begin <= end
 }
 
+/// What a column takes beside names.
+const BESIDE_NAME: f64 = SWATCH + 26.0;
+
 /// The width of each column of so many rows.
-fn widths(named: &[&Series], rows: usize) -> Vec<f64> {
-    let of = |series: &&Series| SWATCH + 8.0 + font::width(&series.name, TEXT) + 18.0;
-    named.chunks(rows).map(|column| column.iter().map(of).fold(0.0, f64::max)).collect()
+fn widths(names: &[String], rows: usize) -> Vec<f64> {
+    let of = |name: &String| font::width(name, TEXT) + BESIDE_NAME;
+    names.chunks(rows).map(|column| column.iter().map(of).fold(0.0, f64::max)).collect()
 }
 
 /// Writes beside a horizontal line at `y` what it is, at the end where it covers least.

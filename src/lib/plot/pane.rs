@@ -245,11 +245,12 @@ impl<'a> Pane<'a> {
         let foot = self.area.bottom() + TICK + LINE + LABEL + 3.0;
         write(drawing, &self.panel.x.label, [center, foot], LABEL, Anchor::Middle);
         write_upward(drawing, &self.panel.y.label, [self.cell.left + MARGIN + LABEL, middle], LABEL);
-        // Above the middle of the frame, or as near to it as the cell has room.
+        // Above the middle of the frame, or as near to it as the cell has room, all lines alike.
+        let widest = self.room.title.iter().map(|line| font::width(line, LABEL)).fold(0.0, f64::max);
+        let half = 0.5 * widest + MARGIN;
+        let [first, last] = [self.cell.left + half, self.cell.right() - half];
+        let middle = if first <= last { center.clamp(first, last) } else { 0.5 * (first + last) };
         for (index, line) in self.room.title.iter().enumerate() {
-            let half = 0.5 * font::width(line, LABEL) + 2.0;
-            let [first, last] = [self.cell.left + half, self.cell.right() - half];
-            let middle = if first <= last { center.clamp(first, last) } else { 0.5 * (first + last) };
             let baseline = self.cell.top + 6.0 + LABEL + LINE * index as f64;
             write(drawing, line, [middle, baseline], LABEL, Anchor::Middle);
         }

@@ -55,7 +55,8 @@ impl<'a> Room<'a> {
     /// Makes room for the legend above the frame.
     pub fn put_legend_above(&mut self, panel: &'a Panel, cell_width: f64) {
         const GAP: f64 = 8.0;
-        let legend = Legend::of(panel, &self.x, &self.y).map(|legend| legend.spread(cell_width - self.left - RIGHT));
+        let legend = Legend::of(panel, &self.x, &self.y)
+            .map(|legend| legend.spread(cell_width - self.left - RIGHT, cell_width - MARGIN - RIGHT));
         if let Some(legend) = &legend {
             let height = legend.size()[1] + GAP;
             (self.top, self.head) = (self.top + height, self.head + height);

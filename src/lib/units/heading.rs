@@ -1,7 +1,7 @@
 //! What the heading of a column says about the unit of its numbers: as people write it, beside names, brackets and factors.
 
 use super::other::OtherUnit;
-use super::quantity::{by_spelling, is_per_interval, names, quantity_named};
+use super::quantity::{JANSKYS, READINGS, by_spelling, is_per_interval, is_reading, names, quantity_named};
 use super::spectral::{Found, Stated, as_written, units_among};
 use super::spelling::{Base, Token, base, tokens};
 
@@ -104,14 +104,17 @@ const RATIOS: [&str; 10] = [
     "percent",
     "pct",
 ];
-/// Units of what an instrument reads.
-const READINGS: [&str; 10] = ["counts", "count", "cts", "dn", "adu", "v", "mv", "uv", "volt", "volts"];
 const PHOTONS: [&str; 3] = ["photon", "photons", "quanta"];
 
 /// The same, where the name and the unit do not contradict each other.
 fn of_name_and_unit(heading: &str) -> Option<Stated> {
     let whole = |kind| Some(Stated::Other { text: heading.trim().to_owned(), kind });
-    let radiances = units_among(&tokens(heading)).into_iter().filter(|found| matches!(found.says, Stated::Radiance(_)));
+    let all = units_among(&tokens(heading));
+    // `(W m-2 sr-1 nm-1)/V`: what stands behind the brackets divides.
+    if all.iter().any(|found| matches!(found.says, Stated::Other { kind: OtherUnit::PerReading, .. })) {
+        return whole(OtherUnit::PerReading);
+    }
+    let radiances = all.into_iter().filter(|found| matches!(found.says, Stated::Radiance(_)));
     let radiances: Vec<Stated> = radiances.map(|found| found.says).collect();
     if radiances.windows(2).any(|pair| pair[0] != pair[1]) {
         return whole(OtherUnit::Several);
@@ -123,7 +126,11 @@ fn of_name_and_unit(heading: &str) -> Option<Stated> {
         if let [found] = units_among(&tokens).as_slice()
             && matches!(found.says, Stated::Radiance(_))
         {
-            let scaled = if is_beside_factor(found, text, &tokens) {
+            // One letter is a name.
+            let reads = |token: &Token| token.lower().is_some_and(|word| word.len() > 1 && is_reading(&word));
+            let scaled = if tokens.iter().any(reads) {
+                whole(OtherUnit::PerReading)
+            } else if is_beside_factor(found, text, &tokens) {
                 whole(OtherUnit::BesideFactor)
             } else {
                 beside_factor(heading, &outside)
@@ -179,7 +186,7 @@ fn of_name_and_unit(heading: &str) -> Option<Stated> {
 /// Whether a heading without brackets is nothing but a unit: a word for levels or for light as the eye weights it, `dB`, or a word
 /// and what it is divided by, `cd/m2/nm`, `E m-2 s-1 nm-1`. One divisor may be a name's, `L/nm`.
 fn is_bare_unit(heading: &str) -> bool {
-    const LEVELS: [&str; 3] = ["db", "dbm", "flick"];
+    const LEVELS: [&str; 6] = ["db", "dbm", "flick", "flicks", "microflick", "microflicks"];
     let tokens = tokens(heading);
     let Some((Token::Factor { word, exponent: None }, rest)) = tokens.split_first() else { return false };
     let word = word.to_lowercase();
@@ -200,7 +207,7 @@ fn is_bare_unit(heading: &str) -> bool {
     match divisors {
         // Two letters are a name.
         0 => rest.is_empty() && (LEVELS.contains(&word.as_str()) || is_photometric && word.len() > 2),
-        1 => is_photometric,
+        1 => is_photometric || JANSKYS.contains(&word.as_str()),
         _ => true,
     }
 }
@@ -367,7 +374,7 @@ fn in_brackets(heading: &str) -> Option<&str> {
 /// Whether a text is the unit of something, known or not: it has powers or is divided, or is a unit or a scale that people
 /// name.
 fn looks_like_a_unit(text: &str) -> bool {
-    const NAMED: [&str; 32] = [
+    const NAMED: [&str; 35] = [
         "cd",
         "lm",
         "lx",
@@ -375,6 +382,9 @@ fn looks_like_a_unit(text: &str) -> bool {
         "nit",
         "nits",
         "flick",
+        "flicks",
+        "microflick",
+        "microflicks",
         "mw",
         "gw",
         "pw",

@@ -3,6 +3,7 @@
 //! Wavelengths are in nm, spectral radiance in W cm⁻² sr⁻¹ nm⁻¹, areas in cm², charge in electrons, luminance in
 //! cd m⁻². Every conversion stands here; a bare power of ten elsewhere is a defect.
 
+mod comment;
 mod heading;
 mod other;
 mod quantity;
@@ -11,9 +12,10 @@ mod spelling;
 mod wavelength;
 pub mod written;
 
+pub use comment::units_in;
 pub use heading::{is_per_cent, unit_of_heading};
 pub use other::OtherUnit;
-pub use spectral::{RadianceUnit, Stated, units_in};
+pub use spectral::{RadianceUnit, Stated};
 pub use wavelength::WavelengthUnit;
 
 use crate::names::{Named, serde_by_name};

@@ -53,6 +53,8 @@ pub enum OtherUnit {
     Ratio,
     /// What an instrument reads: counts, codes, volts.
     Reading,
+    /// A radiance for each of what an instrument reads: `W m-2 sr-1 nm-1 / count`.
+    PerReading,
     /// Of no scale: arbitrary units, relative values.
     Relative,
     /// A logarithm or a root of radiance.
@@ -96,6 +98,7 @@ impl OtherUnit {
             Self::Energy => "of energy, a radiance summed over time, which has no s-1",
             Self::Ratio => "a ratio, not the radiance itself",
             Self::Reading => "what an instrument reads, not what that means",
+            Self::PerReading => "a radiance for each count or volt that an instrument reads, not the radiance itself",
             Self::Relative => "of no scale, which does not tell how bright the light is",
             Self::Function => "a logarithm or a root, not the radiance itself",
             Self::Unknown => "no unit of spectral radiance that is known",
@@ -130,6 +133,7 @@ impl OtherUnit {
                 "multiply each value, as a fraction of 1, by the radiance that a perfect white, or no filter, has in the same light"
             }
             Self::Reading => "multiply each value by the calibration of the instrument",
+            Self::PerReading => "multiply what the instrument reads by each value",
             Self::Function => "of log10 take 10^value, of ln e^value, of sqrt value^2",
             Self::PerCentimeter
             | Self::Scaled

@@ -8,6 +8,17 @@ pub(super) fn names(heading: &str, words: &[&str]) -> bool {
     tokens(heading).iter().filter_map(Token::lower).any(|word| words.contains(&word.as_str()))
 }
 
+/// Units of what an instrument reads.
+pub(super) const READINGS: [&str; 10] = ["counts", "count", "cts", "dn", "adu", "v", "mv", "uv", "volt", "volts"];
+
+/// Whether a word is such a unit.
+pub(super) fn is_reading(word: &str) -> bool {
+    READINGS.contains(&word.to_lowercase().as_str())
+}
+
+/// Units of flux per frequency.
+pub(super) const JANSKYS: [&str; 6] = ["jy", "mjy", "kjy", "ujy", "jansky", "janskys"];
+
 /// What the name of a quantity is that is no light, or that of no direction.
 pub(super) fn quantity_named(text: &str) -> Option<OtherUnit> {
     const ARCSECONDS: [&str; 4] = ["arcsec", "arcsecond", "arcseconds", "asec"];
@@ -45,7 +56,6 @@ pub(super) fn quantity_named(text: &str) -> Option<OtherUnit> {
 pub(super) fn by_spelling(text: &str) -> Option<OtherUnit> {
     const CURRENTS: [&str; 8] = ["a", "ma", "ua", "na", "amp", "amps", "ampere", "amperes"];
     const ANGLES: [&str; 7] = ["arcsec", "arcsecond", "arcseconds", "arcmin", "deg", "degree", "degrees"];
-    const JANSKYS: [&str; 6] = ["jy", "mjy", "kjy", "ujy", "jansky", "janskys"];
     let tokens = tokens(text);
     let is_power_of = |word: &str| matches!(base(word), Some(Base::Power(_)));
     let is_current = |word: &str| CURRENTS.contains(&word.to_lowercase().as_str());
@@ -133,6 +143,7 @@ mod tests {
             ("R [mA W-1]", Responsivity),
             ("responsivity", Responsivity),
             ("sky (Jy/sr)", PerFrequency),
+            ("MJy/sr", PerFrequency),
             ("radiance (W/m2/deg2/nm)", OtherAngle),
             ("radiance (W m-2 arcsec-2 nm-1)", OtherAngle),
             ("radiance (W/(m2 sr bin))", AllWavelengths),

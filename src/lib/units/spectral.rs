@@ -4,6 +4,7 @@
 //! order, alone or among other words; and with energies over time, `erg s-1 cm-2 sr-1 A-1`. What follows a slash or `per` is divided by.
 
 use super::other::OtherUnit;
+use super::quantity::is_reading;
 use super::spelling::{Base, Length, Power, Token, base, tokens};
 use super::wavelength::WavelengthUnit;
 use std::fmt;
@@ -90,12 +91,6 @@ pub enum Stated {
         /// What it is.
         kind: OtherUnit,
     },
-}
-
-/// The units of radiance, or of what may be taken for it, that a text names, first to last.
-pub fn units_in(text: &str) -> Vec<Stated> {
-    let tokens = tokens(text);
-    units_among(&tokens).into_iter().map(|found| found.written_in(text, &tokens)).collect()
 }
 
 /// Tokens as a text.
@@ -185,13 +180,9 @@ pub(super) fn units_among(tokens: &[Token]) -> Vec<Found> {
             end += 1;
         }
         if end - begin > 1 {
-            let number = |place: usize| match &tokens[place] {
-                Token::Number(number) => Some(number.as_str()),
-                _ => None,
-            };
-            let scale = (begin > 0).then(|| number(begin - 1)).flatten();
+            let scale = begin.checked_sub(1).and_then(|place| tokens[place].number());
             // Two numbers are no scale.
-            let is_one = begin < 2 || number(begin - 2).is_none();
+            let is_one = begin < 2 || tokens[begin - 2].number().is_none();
             let from = if scale.is_some() { begin - 1 } else { begin };
             let says = product(&tokens[begin..end]);
             // What divides and is not known is part of it: `W/km2/sr/nm`, `W/m2/sr/5nm`.
@@ -209,6 +200,11 @@ pub(super) fn units_among(tokens: &[Token]) -> Vec<Found> {
                 unit.power.times(scale).filter(|_| is_one).map(|power| RadianceUnit { power, ..unit })
             };
             let says = match (scale, says) {
+                (_, Ok(_)) if is_per_reading(tokens, end) => {
+                    end += 1;
+                    Stated::Other { text: shown(&tokens[from..end]), kind: OtherUnit::PerReading }
+                }
+                (_, Ok(_)) if is_of_reading_per(tokens, from) => Stated::Other { text, kind: OtherUnit::Responsivity },
                 (None, Ok(unit)) => Stated::Radiance(unit),
                 (Some(scale), Ok(unit)) => {
                     scaled(unit, scale).map_or(Stated::Other { text, kind: OtherUnit::Scaled }, Stated::Radiance)
@@ -223,6 +219,21 @@ pub(super) fn units_among(tokens: &[Token]) -> Vec<Found> {
         }
     }
     found
+}
+
+/// Whether a unit that ends before `place` is divided by what an instrument reads: `/ count`, `DN-1`.
+fn is_per_reading(tokens: &[Token], place: usize) -> bool {
+    match tokens.get(place) {
+        Some(Token::Factor { word, exponent: None }) => is_reading(word) && tokens[place - 1] == Token::Per,
+        Some(Token::Factor { word, exponent: Some(-1) }) => is_reading(word),
+        _ => false,
+    }
+}
+
+/// Whether a unit that begins at `place` divides what an instrument reads: `counts / (W ...)`.
+fn is_of_reading_per(tokens: &[Token], place: usize) -> bool {
+    let before = tokens[..place].split_last_chunk();
+    matches!(before, Some((_, [Token::Factor { word, exponent: None }, Token::Per])) if is_reading(word))
 }
 
 /// What a product of factors is: a unit of spectral radiance, or what else.

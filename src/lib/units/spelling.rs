@@ -104,6 +104,14 @@ impl Token {
         }
     }
 
+    /// The number that it is.
+    pub(super) fn number(&self) -> Option<&str> {
+        match self {
+            Self::Number(number) => Some(number),
+            _ => None,
+        }
+    }
+
     /// Whether it is a factor that is no unit here.
     pub(super) fn is_strange(&self) -> bool {
         matches!(self, Self::Factor { word, .. } if base(word).is_none())

@@ -30,8 +30,15 @@ impl Curves<'_> {
         let found = match (&mut files.quantum_efficiency, &mut files.relative_response) {
             (Some(curve), _) => self.absolute(curve)?.map(|classes| (classes, Scale::Absolute)),
             (None, Some(curve)) => {
-                let classes = self.relative(curve)?;
-                let counts = files.counts.unwrap_or_else(|| {
+                let (classes, of_energy) = self.relative(curve)?;
+                if let Some(heading) = of_energy.as_ref().filter(|_| files.counts == Some(Counts::Quanta)) {
+                    let problem = format!(
+                        "the heading `{heading}` of its response says that it counts energy, and `counts` quanta; mend the one that is wrong"
+                    );
+                    return Err(Error::format(self.sensor, problem));
+                }
+                let said = files.counts.or(of_energy.map(|_| Counts::Energy));
+                let counts = said.unwrap_or_else(|| {
                     self.doubts.push(format!(
                         "nobody says whether its response counts energy or quanta; it is taken as {} (--counts)",
                         Counts::default().name()
@@ -64,12 +71,17 @@ impl Curves<'_> {
     }
 
     /// Quantum efficiencies.
-    fn absolute(&self, curve: &mut CurveFile) -> Result<Option<[Curve; 3]>> {
+    fn absolute(&mut self, curve: &mut CurveFile) -> Result<Option<[Curve; 3]>> {
         let (name, bytes) = self.bytes(curve)?;
         let efficiencies = SpectralTable::parse(&name, &bytes)?;
         let class = |column: Option<&str>| self.share(&efficiencies, column, Share::QuantumEfficiency);
         if self.array.is_none_or(FilterArray::has_three_classes) {
-            return Ok(Some([class(Some("R"))?, class(Some("G"))?, class(Some("B"))?]));
+            let classes = [class(Some("R"))?, class(Some("G"))?, class(Some("B"))?];
+            self.doubts.extend(exchanged(&classes));
+            self.doubts.extend(curve.column.as_ref().map(|column| {
+                format!("`column: {column}` of its quantum efficiency does not count: each class has a column of its own, R, G and B")
+            }));
+            return Ok(Some(classes));
         }
         let filters = self.array.map_or_else(Vec::new, FilterArray::filters);
         if filters.is_empty() {
@@ -94,13 +106,14 @@ impl Curves<'_> {
         within_unit(self.sensor, key, table.curve_at(index)?)
     }
 
-    /// Relative responses, which are of R, G and B alone.
-    fn relative(&mut self, curve: &mut CurveFile) -> Result<Option<[Curve; 3]>> {
+    /// Relative responses, which are of R, G and B alone, and the heading that says that they count energy.
+    fn relative(&mut self, curve: &mut CurveFile) -> Result<(Option<[Curve; 3]>, Option<String>)> {
         let (name, bytes) = self.bytes(curve)?;
         let table = ResponseTable::parse(&name, &bytes, curve.column.as_deref())?;
         self.doubts.extend(table.doubts);
         self.about = table.about;
-        Ok(Some(table.classes).filter(|_| self.array.is_none_or(FilterArray::has_three_classes)))
+        let has_three = self.array.is_none_or(FilterArray::has_three_classes);
+        Ok((Some(table.classes).filter(|_| has_three), table.of_energy))
     }
 }
 
@@ -123,6 +136,28 @@ fn doubt_of_ends(classes: &[Curve; 3], cover_glass: Option<&Curve>) -> Option<St
     });
     let cut: Vec<String> = cut.collect();
     (!cut.is_empty()).then(|| ends_early("quantum efficiency", &cut.join(", ")))
+}
+
+/// A warning of efficiencies of R and B that stand in each other's place, as far as no infrared counts, which B may let through.
+fn exchanged([red, _, blue]: &[Curve; 3]) -> Option<String> {
+    const SEEN_NM: std::ops::RangeInclusive<u16> = 400..=680;
+    /// Curves that are alike are no more apart.
+    const APART_NM: f64 = 1.0;
+    let mean = |curve: &Curve| {
+        let [moment, sum] = SEEN_NM.map(f64::from).fold([0.0; 2], |[moment, sum], nm| {
+            let value = curve.at(nm);
+            [moment + value * nm, sum + value]
+        });
+        moment / sum
+    };
+    let [red, blue] = [red, blue].map(mean);
+    (red + APART_NM < blue).then(|| {
+        format!(
+            "the mean wavelengths of its quantum efficiencies of R and B up to {} nm are {red:.0} and {blue:.0} nm, which is not the order \
+             of their names",
+            SEEN_NM.end()
+        )
+    })
 }
 
 /// An efficiency or a transmittance is a fraction.

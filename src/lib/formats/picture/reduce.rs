@@ -70,7 +70,10 @@ impl Reduction {
         let [columns, rows] = self.step;
         match (filter, self.shown) {
             (_, 1) if self.step == [1, 1] => None,
-            (None, _) => Some(format!("each pixel the mean of {columns} × {rows} samples")),
+            (None, _) => {
+                let [columns, rows] = [columns.min(self.region.width), rows.min(self.region.height)];
+                Some(format!("each pixel the mean of {columns} × {rows} samples"))
+            }
             (Some(filter), 1) => Some(format!("each pixel the {filter} of {columns} × {rows} photosites")),
             (Some(filter), shown) => {
                 Some(format!("each pixel the mean of the {shown} {filter} of {columns} × {rows} photosites"))
@@ -419,6 +422,11 @@ mod tests {
         ] {
             assert_eq!(words(fit, class).as_deref(), wanted);
         }
+        let geometry = Geometry::new(20, 3, &["Y"]);
+        let narrow = FrameHeader { name: "f".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+        let choice = Choice::of(&narrow, None, false).unwrap();
+        let words = Reduction::new(&narrow, Region::whole(&narrow), Some(4), &choice).in_words(None);
+        assert_eq!(words.as_deref(), Some("each pixel the mean of 5 × 3 samples"));
         // Squares are whole periods: no class counts more in one than in another.
         let made = reduced(&["Y"], [12, 12], Some(4), None, |x, y, _| {
             1000.0 * f32::from(pattern.class(3 + x as i64, 1 + y as i64) as u8)

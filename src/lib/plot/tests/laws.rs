@@ -227,3 +227,30 @@ fn a_legend_without_room_stands_above_the_frame() {
         }
     }
 }
+
+#[test]
+fn long_names_and_titles_stay_in_their_own_cell() {
+    let mut panel = Panel::new(Axis::linear("x"), Axis::linear("y"));
+    panel.title = "94 % of a class with some name in its lowest bin, beyond the axis; 94 % of another".into();
+    let mut next = numbers(7);
+    for index in 0..3 {
+        let points = (0..60).map(|_| [next(), next()]).collect();
+        let name = format!("{index}_very_long_layer_name_number_one.channel_of_the_north");
+        panel.add(&name, Color::of_index(index), Marks::Points(points));
+    }
+    let plot = Plot { panels: vec![panel; 5], arrangement: Arrangement::Pairs, ..two_panels() };
+    super::keep("long-names", &plot);
+    let all = elements(&plot);
+    let boxes: Vec<[f64; 4]> =
+        all.iter().filter(|e| e.is_closed() && e.get("fill-opacity") == "0.88").map(|e| e.bounds()).collect();
+    assert_eq!(boxes.len(), 5);
+    for (index, legend) in boxes.iter().enumerate() {
+        assert!(boxes[..index].iter().all(|other| !super::overlap(*legend, *other)), "{boxes:?}");
+    }
+    // Two cells are 1040 pixels wide, and the margin of a title 14.
+    let written = words(&plot);
+    assert!(
+        written.iter().all(|(word, [left, _, right, _])| *left >= 13.0 && *right <= 1027.0 || word.is_empty()),
+        "{written:?}"
+    );
+}

@@ -120,7 +120,7 @@ fn profile(portrait: &Portrait, scale: &Scale, axis: usize) -> Panel {
     for (color, group) in scale.groups(portrait) {
         let Some(reference) = reference(group) else { continue };
         let points: Vec<[f64; 2]> =
-            group.profiles[axis].points().map(|[at, mean]| [corner + at, mean - reference]).collect();
+            group.profiles[axis].points().map(|[at, mean]| [corner + at, deviation(mean, reference)]).collect();
         let [[first, _], .., [last, _]] = points[..] else { continue };
         means.extend(points.iter().map(|[_, mean]| *mean));
         panel.add(&group.name, color, Marks::Line(points));
@@ -149,6 +149,13 @@ fn profile(portrait: &Portrait, scale: &Scale, axis: usize) -> Panel {
         panel.add("", color, Marks::Dashed(lower));
     }
     panel
+}
+
+/// A mean less that of all: 0 where the two are alike but for the rounding of their sums.
+fn deviation(mean: f64, reference: f64) -> f64 {
+    const ROUNDING: f64 = 1e-12;
+    let deviation = mean - reference;
+    if deviation.abs() <= ROUNDING * reference.abs() { 0.0 } else { deviation }
 }
 
 /// Correlations along x (axis 0) or y (axis 1); nothing where there are no pairs.

@@ -117,7 +117,7 @@ impl Scene {
         let electrons_of = |index: usize| checked(seen.camera.electrons(&radiance_of(index)?), &name);
         let warn = |index: usize, notes: &mut Vec<Note>| -> Result<()> {
             let (_, assumed) = table.radiance_unit(index, given)?;
-            notes.extend(assumed.into_iter().chain(table.negative(index)).map(Note::Warning));
+            notes.extend(assumed.into_iter().chain(table.doubt_of_values(index)).map(Note::Warning));
             Ok(())
         };
         let count = table.columns.len();
