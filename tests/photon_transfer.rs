@@ -10,6 +10,7 @@ use cyanometer::camera::optics::Exposure;
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::chain::{CameraSetup, uniform_frame};
 use cyanometer::metadata::Scene;
+use cyanometer::numerics::variance_components::Interval;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::MemoryFrame;
@@ -17,8 +18,8 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use support::misses::{CONFIDENCE, allowed_misses, check_misses, trials};
 use support::photon_transfer::{
-    Chance, FLAT_S, Kind, QUANTUM_EFFICIENCY, SIZE, Shake, WARM_K, camera, found, level, levels, levels_of, measured,
-    settings, truths,
+    Chance, FLAT_S, Kind, QUANTUM_EFFICIENCY, SIZE, Shake, WARM_K, camera, expected_variance, found, level, levels,
+    levels_of, measured, saturation, settings, truths,
 };
 
 #[test]
@@ -75,6 +76,55 @@ fn check_coverage(kind: Kind) {
 /// A level as it is with another light than is said: its signal so many times as large.
 fn relit(flat: &Level, dark: &Level, times: f64) -> Level {
     Level { mean: dark.mean + (flat.mean - dark.mean) * times, ..flat.clone() }
+}
+
+/// Of 50 flats a hundredth of saturation apart, and of 10, variances scatter by 2.6 %: saturation lies within its interval as often as is stated.
+#[test]
+fn saturation_of_many_levels_lies_within_its_interval() {
+    const CAMERAS: u32 = 4;
+    let draws = u32::try_from(trials(60)).unwrap();
+    let cameras: Vec<(ReadOut, [Vec<Level>; 2])> = (0..CAMERAS)
+        .into_par_iter()
+        .map(|index| {
+            let readout = camera(index, Kind::Ccd);
+            let levels = levels(&readout, index);
+            (readout, levels)
+        })
+        .collect();
+    for count in [10, 50] {
+        let held = cameras.iter().enumerate().flat_map(|(index, (readout, [flats, darks]))| {
+            let truth = saturation(readout);
+            let lit = |place: u32| {
+                let signal_e = truth * (0.75 + 0.5 * f64::from(place) / f64::from(count));
+                let condition = Condition { photons: Some(signal_e / QUANTUM_EFFICIENCY), ..flats[8].condition };
+                let mean = darks[0].mean + readout.adu_per_e * signal_e;
+                let variance = readout.adu_per_e.powi(2) * expected_variance(readout, signal_e);
+                Level { condition, mean, variance, ..flats[8].clone() }
+            };
+            let many: Vec<Level> = (0..count).map(lit).collect();
+            let held = (0..draws).into_par_iter().map(move |draw| {
+                let mut chance = Chance { camera: 1000 * index as u32 + draw, drawn: 0 };
+                // The sum of 12 uniform numbers is normal enough.
+                let mut normal = || (0..12).map(|_| chance.uniform()).sum::<f64>() - 6.0;
+                let drawn = |flat: &Level| {
+                    let scatter = (2.0 / flat.freedom()).sqrt();
+                    let variance = flat.variance * (1.0 + scatter * normal());
+                    Level { variance, variance_variance: (variance * scatter).powi(2), ..flat.clone() }
+                };
+                let flats: Vec<Level> = flats[..8].iter().cloned().chain(many.iter().map(drawn)).collect();
+                let found = found(&flats, darks);
+                [("saturation_e", truth), ("saturation_photons", truth / QUANTUM_EFFICIENCY)].map(|(key, truth)| {
+                    let Interval { low, high, .. } = found.get(key).unwrap();
+                    (low..=high).contains(&truth)
+                })
+            });
+            held.collect::<Vec<_>>()
+        });
+        let held: Vec<[bool; 2]> = held.collect();
+        for which in [0, 1] {
+            check_misses(&format!("{count} levels"), held.iter().map(|held| Some(held[which])));
+        }
+    }
 }
 
 /// A lamp whose light scatters by 0.5 % from level to level, alike in proportion at all: of 60 measurements 3 responsivities may

@@ -18,8 +18,8 @@ mod weights;
 
 pub use bend::Bend;
 pub use ends::{
-    LEAST_VARIANCE, are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, stuck_shares,
-    without_clipped, without_stuck,
+    LEAST_VARIANCE, are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, may_be_largest,
+    stuck_shares, without_clipped, without_stuck,
 };
 pub use weights::BEYOND_FIVE;
 
