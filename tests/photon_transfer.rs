@@ -92,7 +92,7 @@ fn saturation_of_many_levels_lies_within_its_interval() {
         })
         .collect();
     for count in [10, 50] {
-        let held = cameras.iter().enumerate().flat_map(|(index, (readout, [flats, darks]))| {
+        let held = (0..).zip(&cameras).flat_map(|(index, (readout, [flats, darks])): (u32, _)| {
             let truth = saturation(readout);
             let lit = |place: u32| {
                 let signal_e = truth * (0.75 + 0.5 * f64::from(place) / f64::from(count));
@@ -103,7 +103,7 @@ fn saturation_of_many_levels_lies_within_its_interval() {
             };
             let many: Vec<Level> = (0..count).map(lit).collect();
             let held = (0..draws).into_par_iter().map(move |draw| {
-                let mut chance = Chance { camera: 1000 * index as u32 + draw, drawn: 0 };
+                let mut chance = Chance { camera: 1000 * index + draw, drawn: 0 };
                 // The sum of 12 uniform numbers is normal enough.
                 let mut normal = || (0..12).map(|_| chance.uniform()).sum::<f64>() - 6.0;
                 let drawn = |flat: &Level| {
