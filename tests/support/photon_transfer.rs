@@ -231,26 +231,34 @@ pub fn levels_of(camera: (&ReadOut, u32, Shake)) -> [Vec<Level>; 3] {
     [flats, darks, warm]
 }
 
+/// The code from which on codes are the largest, in electrons above black.
+fn top_e(readout: &ReadOut) -> f64 {
+    (f64::from((1_u32 << readout.bits) - 1) + 0.5 - readout.bias_adu) / readout.adu_per_e
+}
+
+/// The expected temporal variance of a signal of so many electrons, in electrons², over the photosites: a normal law in 21 steps.
+pub fn expected_variance(readout: &ReadOut, signal: f64) -> f64 {
+    let dark = readout.dark_current_e_per_s(readout.temperature_k) * FLAT_S;
+    let steps = (-10..=10).map(|step| f64::from(step) / 2.5);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for step in steps {
+        let rate = signal * (1.0 + readout.prnu * step) + dark;
+        let held = NearlyNormal::normal(rate, rate).clipped_above(readout.full_well_e);
+        let read =
+            NearlyNormal::normal(held.mean, held.variance + readout.read_noise_e.powi(2)).clipped_above(top_e(readout));
+        let weight = (-0.5 * step * step).exp();
+        sum += weight * read.variance;
+        weights += weight;
+    }
+    sum / weights
+}
+
 /// The signal of the largest temporal variance, in electrons.
 pub fn saturation(readout: &ReadOut) -> f64 {
-    let top = (f64::from((1_u32 << readout.bits) - 1) + 0.5 - readout.bias_adu) / readout.adu_per_e;
-    let dark = readout.dark_current_e_per_s(readout.temperature_k) * FLAT_S;
-    let variance = |signal: f64| -> f64 {
-        // Over the photosites: a normal law in 21 steps.
-        let steps = (-10..=10).map(|step| f64::from(step) / 2.5);
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for step in steps {
-            let rate = signal * (1.0 + readout.prnu * step) + dark;
-            let held = NearlyNormal::normal(rate, rate).clipped_above(readout.full_well_e);
-            let read = NearlyNormal::normal(held.mean, held.variance + readout.read_noise_e.powi(2)).clipped_above(top);
-            let weight = (-0.5 * step * step).exp();
-            sum += weight * read.variance;
-            weights += weight;
-        }
-        sum / weights
-    };
-    let levels = (500..=1400).map(|share| f64::from(share) / 1000.0 * top.min(readout.full_well_e));
-    levels.max_by(|a, b| variance(*a).total_cmp(&variance(*b))).unwrap()
+    let end = top_e(readout).min(readout.full_well_e);
+    let variance = |signal: &f64| expected_variance(readout, *signal);
+    let levels = (500..=1400).map(|share| f64::from(share) / 1000.0 * end);
+    levels.max_by(|a, b| variance(a).total_cmp(&variance(b))).unwrap()
 }
 
 /// The mean sensitivity of a camera's green photosites.

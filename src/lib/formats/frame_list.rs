@@ -179,15 +179,53 @@ fn check(name: &str, frame: &ListedFrame) -> Result<()> {
     }
 }
 
-fn of_table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
-    let columns = csv::columns(name, bytes)?;
-    let is_known = |word: &str| COLUMNS.iter().any(|known| known.eq_ignore_ascii_case(word));
-    if let Some(unknown) = columns.iter().find(|column| !is_known(column.trim())) {
+/// How words begin by which people call columns, the columns of a list that have that, and what is to be known of these.
+const MEANT: [(&[&str], &[&str], &str); 7] = [
+    (&["note", "comment", "remark", "description", "operator", "date", "timestamp"], &[], ""),
+    (&["exposure", "texp", "time", "integration", "shutter"], &["exposure_s"], ", in s (20 ms are 0.02)"),
+    (&["photon"], &["photons"], ", per photosite during the exposure"),
+    (&["temp"], &["temperature_k", "temperature_c"], ""),
+    (&["file", "name", "path", "frame", "image"], &["file"], ""),
+    (&["kind", "type"], &["kind"], ", flat or dark"),
+    (&["level", "light", "step"], &["level"], ""),
+];
+
+/// Refuses columns that are not known; those of notes, and of what a known column beside them has, are left alone, with a warning.
+fn check_columns(name: &str, columns: &[String]) -> Result<()> {
+    let is = |column: &str, word: &str| column.trim().eq_ignore_ascii_case(word);
+    let is_known = |word: &str| COLUMNS.iter().any(|known| is(word, known));
+    let mut ignored = Vec::new();
+    for unknown in columns.iter().filter(|column| !is_known(column)) {
+        let words = unknown.to_lowercase();
+        let words = words.split(|c: char| !c.is_alphanumeric());
+        let is_called = |called: &[&str]| words.clone().any(|word| called.iter().any(|start| word.starts_with(start)));
+        let meant = MEANT.iter().find(|(called, ..)| is_called(called));
         let are_blank = unknown.split_whitespace().all(is_known);
-        let advice = if are_blank { ", parted by commas, semicolons or tabs" } else { "" };
+        let advice = match meant {
+            _ if are_blank => ", parted by commas, semicolons or tabs".to_owned(),
+            // Of notes, and beside the column that is meant, nothing is lacking.
+            Some((_, own, _))
+                if own.is_empty() || columns.iter().any(|column| own.iter().any(|own| is(column, own))) =>
+            {
+                ignored.push(format!("`{unknown}`"));
+                continue;
+            }
+            Some((_, own, numbers)) => format!("; call this one `{}`{numbers}, or leave it out", own.join("` or `")),
+            None => "; leave this one out, or call it `note`".to_owned(),
+        };
         let problem = format!("unknown column `{unknown}`; a list of frames has {}{advice}", COLUMNS.join(", "));
         return Err(Error::format(name, problem));
     }
+    if !ignored.is_empty() {
+        let are = if ignored.len() == 1 { "column is" } else { "columns are" };
+        register::doubt(format!("{name}: the {are} not looked at: {}", ignored.join(", ")));
+    }
+    Ok(())
+}
+
+fn of_table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
+    let columns = csv::columns(name, bytes)?;
+    check_columns(name, &columns)?;
     let column = |wanted: &str| -> Result<Option<Vec<String>>> {
         let found = columns.iter().find(|column| column.trim().eq_ignore_ascii_case(wanted));
         found.map(|column| csv::text_column(name, bytes, column)).transpose()
@@ -384,6 +422,21 @@ mod tests {
         assert_eq!(doubt("a,dark,0.01\nb,dark,60\n"), None);
     }
 
+    /// What is no number of a frame, and what a column beside it says, is left alone.
+    #[test]
+    fn notes_are_not_looked_at() {
+        for head in [
+            "file,note,exposure_s",
+            "file,Comments,exposure_s",
+            "file,exposure [ms],exposure_s",
+            "file,frame number,exposure_s",
+        ] {
+            let (_folder, path) = written("list.csv", &format!("{head}\na,20,0.02\n"));
+            let frames = read(&path).unwrap_or_else(|error| panic!("{head}: {error}")).frames;
+            assert_eq!((frames.len(), frames[0].exposure_s), (1, Some(0.02)), "{head}");
+        }
+    }
+
     #[test]
     fn mistakes_are_named() {
         for (file, text, wanted) in [
@@ -393,6 +446,16 @@ mod tests {
                 "file kind\na flat\n",
                 "`file kind`; a list of frames has file, kind, exposure_s, photons, temperature_k, ",
             ),
+            ("list.csv", "file,ExposureTime\na,1\n", "level; call this one `exposure_s`, in s"),
+            ("list.csv", "file,Exposure (s)\na,1\n", "`Exposure (s)`; a list of frames has file, "),
+            (
+                "list.csv",
+                "file,exposure_ms\na,1\n",
+                "level; call this one `exposure_s`, in s (20 ms are 0.02), or leave it out",
+            ),
+            ("list.csv", "file,temp\na,1\n", "level; call this one `temperature_k` or `temperature_c`"),
+            ("list.csv", "file,gain_db\na,1\n", "`gain_db`; a list of frames has file, kind, exposure_s, photons, "),
+            ("list.csv", "file,gain_db\na,1\n", "level; leave this one out, or call it `note`"),
             ("list.csv", "file kind\na flat\n", "level, parted by commas, semicolons or tabs"),
             ("list.csv", "file,kind\na,light\n", "`light` in row 1 of `kind` is neither flat nor dark"),
             ("list.csv", "file,exposure_s\na,-1\n", "`exposure_s` of a is -1; it must be above 0"),

@@ -1,10 +1,9 @@
 //! What may make the numbers of a camera wrong, as its levels show it.
 
-use super::curve::{BEYOND_FIVE, Bend, Curve, below_saturation};
+use super::curve::{BEYOND_FIVE, Curve, below_saturation};
 use super::level::Level;
 use super::suspects::Suspect;
 use super::tally::SiteSurvey;
-use crate::numerics::quantiles::of_student;
 
 /// So many standard deviations are beyond chance.
 const BEYOND: f64 = 5.0;
@@ -169,13 +168,12 @@ fn cut_off(curve: &Curve, flats: &[Level]) -> Option<String> {
 
 /// A response that bends, which the variances follow and their scatter hides.
 fn bent(curve: &Curve, confidence: f64) -> Option<String> {
-    /// What is as sure is beyond chance.
-    const SURE: f64 = 0.999;
-    let Bend { missed, scatter, freedom } = curve.bend()?;
+    let bend = curve.bend()?;
+    let missed = bend.missed;
     let gain = curve.interval(|values| Some(values.gain), confidence)?;
     let width = (gain.high - gain.low) / (2.0 * gain.value);
-    // Beyond what light that flickers from level to level makes of it, and more than half of what the interval has room for.
-    let is_told = missed.abs() > of_student(SURE, freedom) * scatter && missed.abs() > width / 2.0;
+    // More than half of what the interval has room for.
+    let is_told = bend.is_sure() && missed.abs() > width / 2.0;
     is_told.then(|| {
         format!(
             "the response bends, so that the gain, the slope of the whole photon transfer curve, is about {:.1} % {} than that of \

@@ -98,7 +98,7 @@ pub fn of_class(
     add("threshold_e", threshold_e.clone());
     add("threshold_photons", threshold_e.clone().and_then(|threshold| Ok(over(threshold, efficiency?))));
     let limit = Limit::of(&curve, flats, settings);
-    let [saturation_e, saturation_photons, full_well] = limit.capacities(reasons, gain.clone());
+    let [saturation_e, saturation_photons, full_well] = limit.capacities(reasons, gain.clone(), confidence);
     add("saturation_e", saturation_e.clone());
     let off = |photons: Interval| widened(photons, (settings.photon_error * photons.value).powi(2), confidence);
     add("saturation_photons", saturation_photons.map(off));

@@ -1,6 +1,6 @@
 //! What saturates: photosites that are full, or the converter, which has no larger code.
 
-use super::curve::{Curve, LEAST_VARIANCE};
+use super::curve::{Curve, LEAST_VARIANCE, may_be_largest};
 use super::level::Level;
 use super::reasons::{CLIPPED, Reasons, UNSATURATED};
 use super::settings::Settings;
@@ -62,7 +62,7 @@ impl Limit {
     }
 
     /// Saturation capacity in electrons, of light alone, and in photons, and the full well, of all charge.
-    pub fn capacities(&self, reasons: Reasons, gain: Found) -> [Found; 3] {
+    pub fn capacities(&self, reasons: Reasons, gain: Found, confidence: f64) -> [Found; 3] {
         let Reasons { curve, flats, .. } = reasons;
         let all = |why: String| [Err(why.clone()), Err(why.clone()), Err(why)];
         let gain = match gain {
@@ -73,13 +73,17 @@ impl Limit {
         if !curve.knows_black(peak) {
             return all(reasons.of_darks());
         }
-        // The largest variance lies between the neighbors of the level that has it.
-        let [below, above] = [peak.saturating_sub(1), (peak + 1).min(flats.len() - 1)];
-        let bracket =
-            |of: &dyn Fn(usize) -> f64| Interval { value: of(peak), low: of(below), high: of(above).max(of(peak)) };
+        // The largest variance lies between the neighbors of the level that has it, which may be any of these.
+        let [first, last] = may_be_largest(flats, confidence);
+        let among = first.saturating_sub(1)..=(last + 1).min(flats.len() - 1);
+        let bracket = |of: &dyn Fn(usize) -> f64| Interval {
+            value: of(peak),
+            low: among.clone().map(of).fold(f64::INFINITY, f64::min),
+            high: among.clone().map(of).fold(f64::NEG_INFINITY, f64::max),
+        };
         let electrons = over(bracket(&|flat| curve.signal(flat)), gain);
         let photons = |flat: usize| flats[flat].condition.photons;
-        let has_photons = [below, peak, above].into_iter().all(|flat| photons(flat).is_some());
+        let has_photons = among.clone().all(|flat| photons(flat).is_some());
         let in_photons = has_photons.then(|| bracket(&|flat| photons(flat).unwrap_or_default()));
         let why = || if curve.are_darks_clipped { CLIPPED.into() } else { reasons.of_darks() };
         let in_electrons = |(charge, room): (Interval, f64)| {

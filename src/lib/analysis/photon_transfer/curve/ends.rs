@@ -1,6 +1,7 @@
 //! Samples at the ends of the codes, photosites that are full, and where flats saturate.
 
 use super::super::level::{Level, is_same_time};
+use crate::numerics::quantiles;
 
 /// Below this temporal variance in codes² nothing is known of noise: without any, codes have as much half way between two of them.
 /// The standard's limit is 0.24 \[EMVA1288, Sec. 6.4].
@@ -114,4 +115,17 @@ pub(super) fn peak(flats: &[Level]) -> Option<usize> {
         after.variance < largest.variance - BEYOND * scatter && after.variance < 0.9 * largest.variance
     };
     flats[peak + 1..].iter().any(falls).then_some(peak)
+}
+
+/// The first and the last of the flats, by their places, whose expected variance may be the largest: the one that has it is among those that no
+/// other exceeds by more than both scatter by, with such a probability, whichever of the others may do so by chance \[Gupta1965].
+pub fn may_be_largest(flats: &[Level], confidence: f64) -> [usize; 2] {
+    let others = flats.len().saturating_sub(1).max(1) as f64;
+    let beyond = quantiles::of_normal(1.0 - (1.0 - confidence) / others);
+    let exceeds = |other: &Level, own: &Level| {
+        other.variance - own.variance > beyond * (other.variance_variance + own.variance_variance).sqrt()
+    };
+    let may_be = |flat: &Level| !flats.iter().any(|other| exceeds(other, flat));
+    let [first, last] = [flats.iter().position(may_be), flats.iter().rposition(may_be)];
+    [first.unwrap_or(0), last.unwrap_or(0)]
 }

@@ -59,6 +59,7 @@ impl Curve {
         }
         for dark in 0..self.darks.len() {
             add(&mut moved, &|curve| Some(&mut curve.darks[dark].mean));
+            add(&mut moved, &|curve| Some(&mut curve.darks[dark].bent));
             add(&mut moved, &|curve| Some(&mut curve.darks[dark].variance));
         }
         // All darks are off together, where black drifts from one to the next.

@@ -16,10 +16,9 @@ mod point;
 mod response;
 mod weights;
 
-pub use bend::Bend;
 pub use ends::{
-    LEAST_VARIANCE, are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, stuck_shares,
-    without_clipped, without_stuck,
+    LEAST_VARIANCE, are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, may_be_largest,
+    stuck_shares, without_clipped, without_stuck,
 };
 pub use weights::BEYOND_FIVE;
 
@@ -211,7 +210,7 @@ impl Curve {
             };
             self.darks.iter().enumerate().filter(|(_, dark)| dark.is_whole).filter_map(point).collect()
         };
-        let mean = points(|dark| dark.mean.value, &weights.dark_mean);
+        let mean = points(|dark| dark.mean_of_line().value, &weights.dark_mean);
         let variance = points(|dark| dark.variance.value, &weights.dark_variance);
         (self.times() >= 2).then(|| Some([Line::through(mean)?, Line::through(variance)?])).flatten()
     }
@@ -364,7 +363,7 @@ impl Curve {
                     let hidden = self.whole_darks().map(|dark| of(dark).hidden).fold(0.0, f64::max);
                     self.whole_darks().map(|dark| of(dark).variance).sum::<f64>() / (count * count) + hidden * hidden
                 };
-                [of(|dark| dark.mean), of(|dark| dark.variance)]
+                [of(Point4::mean_of_line), of(|dark| dark.variance)]
             }
             Beneath::Unknown => [0.0; 2],
         }

@@ -25,6 +25,8 @@ impl Datum {
 pub(super) struct Point4 {
     pub(super) exposure_s: Option<f64>,
     pub(super) mean: Datum,
+    /// How far the mean of a dark is off the line over time where the response bends.
+    pub(super) bent: Datum,
     pub(super) variance: Datum,
     pub(super) photons: Option<Datum>,
     /// What its light is uncertain by, as frames scatter: a relative variance.
@@ -46,6 +48,7 @@ impl Point4 {
         Self {
             exposure_s: level.condition.exposure_s,
             mean: Datum { value: level.mean, variance: level.mean_variance + of_black, hidden: hidden.mean },
+            bent: Datum::default(),
             variance: Datum { value: level.variance, variance: level.variance_variance, hidden: hidden.variance },
             photons: level.condition.photons.map(|value| Datum { value, variance: of_photons(value), hidden: 0.0 }),
             light_variance,
@@ -54,5 +57,11 @@ impl Point4 {
             noise: level.mean_variance,
             is_whole: true,
         }
+    }
+
+    /// The mean of a dark as a point of the line over time.
+    pub(super) fn mean_of_line(&self) -> Datum {
+        let Self { mean, bent, .. } = *self;
+        Datum { value: mean.value + bent.value, variance: mean.variance + bent.variance, ..mean }
     }
 }

@@ -1,7 +1,7 @@
 //! What the levels of a curve count in its fits.
 
 use super::super::fit::{Line, Point, variance_besides};
-use super::super::scatter::{among, few};
+use super::super::scatter::{Component, among, few};
 use super::{Curve, Datum, Point4, Weights};
 use crate::numerics::significance;
 use crate::text::in_digits;
@@ -78,42 +78,69 @@ impl Curve {
                 *weight = 1.0 / dark.variance.scatter().max(f64::MIN_POSITIVE);
             }
         }
-        for (which, of) in [|dark: &Point4| dark.mean, |dark: &Point4| dark.variance].into_iter().enumerate() {
-            let points = |besides: f64| -> Vec<Point> {
-                let point = |dark: &Point4| {
-                    let weight = 1.0 / (of(dark).scatter() + besides).max(f64::MIN_POSITIVE);
-                    Some(Point { x: dark.exposure_s?, y: of(dark).value, weight })
-                };
-                self.whole_darks().filter_map(point).collect()
-            };
-            let misfit = |besides: f64| {
-                let points = points(besides);
-                Line::through(points.clone()).map_or(0.0, |line| line.chi_square(points))
-            };
-            let largest = self.whole_darks().map(|dark| of(dark).value.powi(2)).fold(0.0, f64::max);
-            let found = among(freedom, misfit, largest);
-            let besides = found.known(self.confidence);
-            if besides <= 0.0 {
-                continue;
-            }
-            if which == 0 {
-                let missed = misfit(0.0);
-                self.dark_drift = self.dark_drift.max(self.drift_of(missed, freedom, found.variance.sqrt()));
-                self.dark_besides = found;
-                let told = off_line(missed, freedom, found.variance);
-                self.dark_told = self.dark_told.take().or(told);
-            }
-            for dark in &mut self.darks {
-                let datum = if which == 0 { &mut dark.mean } else { &mut dark.variance };
-                datum.variance += besides;
-            }
-            // A black level that moves does so under light too.
-            if which == 0 {
-                self.flats.iter_mut().for_each(|flat| flat.mean.variance += besides);
-            }
-            let weights: Vec<f64> = self.darks.iter().map(|dark| 1.0 / of(dark).scatter()).collect();
-            if which == 0 { self.weights.dark_mean = weights } else { self.weights.dark_variance = weights }
+        self.weigh_dark_means(freedom);
+        let (found, _) = self.off_line(|dark| dark.variance, freedom);
+        let besides = found.known(self.confidence);
+        for (dark, weight) in self.darks.iter_mut().zip(&mut self.weights.dark_variance) {
+            dark.variance.variance += besides;
+            *weight = 1.0 / dark.variance.scatter().max(f64::MIN_POSITIVE);
         }
+    }
+
+    /// What means of darks miss their line by besides is an error of their line alone where the response bends, and else one of black.
+    fn weigh_dark_means(&mut self, freedom: f64) {
+        /// So much of what darks miss their line by is left where they are straightened, at most: a variance.
+        const LEFT: f64 = 0.1;
+        let (found, misfit) = self.off_line(Point4::mean_of_line, freedom);
+        let besides = found.known(self.confidence);
+        if besides <= 0.0 {
+            return;
+        }
+        let left = self.straightened().map(|straight| straight.off_line(Point4::mean_of_line, freedom).0);
+        let is_bent = left.is_some_and(|left| left.variance <= LEFT * found.variance);
+        let (missed, cause) = (found.variance.sqrt(), self.cause(is_bent));
+        self.dark_told = self.dark_told.take().or(told_off_line(misfit, freedom, missed, &cause));
+        if is_bent {
+            self.darks.iter_mut().for_each(|dark| dark.bent.variance = besides);
+        } else {
+            self.dark_drift = self.dark_drift.max(self.drift_of(misfit, freedom, missed));
+            self.dark_besides = found;
+            // A black level that moves does so under light too.
+            self.darks.iter_mut().chain(&mut self.flats).for_each(|level| level.mean.variance += besides);
+        }
+        self.weights.dark_mean = self.darks.iter().map(|dark| 1.0 / dark.mean_of_line().scatter()).collect();
+    }
+
+    /// Why darks miss their line over time, in words.
+    fn cause(&self, is_bent: bool) -> String {
+        if is_bent {
+            return ", as the response bends, which it does as much under light; intervals of dark current and black level take that in".into();
+        }
+        let or_bends = match self.curvature(0.0) {
+            Some(_) => "",
+            None => ", or the response bends, which flats of known light would tell",
+        };
+        format!(
+            ": the black level moves between them, exposure times are wrong, or the sensor was warmer for some{or_bends}; intervals of dark \
+             current, black level and linearity take that in"
+        )
+    }
+
+    /// What darks miss their line over time by besides their own scatter, and the sum of squares that tells it.
+    fn off_line(&self, of: fn(&Point4) -> Datum, freedom: f64) -> (Component, f64) {
+        let points = |besides: f64| -> Vec<Point> {
+            let point = |dark: &Point4| {
+                let weight = 1.0 / (of(dark).scatter() + besides).max(f64::MIN_POSITIVE);
+                Some(Point { x: dark.exposure_s?, y: of(dark).value, weight })
+            };
+            self.whole_darks().filter_map(point).collect()
+        };
+        let misfit = |besides: f64| {
+            let points = points(besides);
+            Line::through(points.clone()).map_or(0.0, |line| line.chi_square(points))
+        };
+        let largest = self.whole_darks().map(|dark| of(dark).value.powi(2)).fold(0.0, f64::max);
+        (among(freedom, misfit, largest), misfit(0.0))
     }
 
     /// How far black may have moved from the first of the darks to the last, in the order of their times, where they miss their line by so much
@@ -177,17 +204,16 @@ impl Curve {
     }
 }
 
-/// What is said of darks whose means miss their line over time, by such a variance besides their own scatter, if that is beyond
+/// What is said of darks whose means miss their line over time by so much besides their own scatter, a standard deviation, if that is beyond
 /// chance.
-fn off_line(misfit: f64, freedom: f64, besides: f64) -> Option<(String, bool)> {
+fn told_off_line(misfit: f64, freedom: f64, besides: f64, cause: &str) -> Option<(String, bool)> {
     /// Less likely is beyond chance.
     const LEVEL: f64 = 1e-4;
     let is_beyond = misfit > freedom && significance::of_chi_square(misfit, freedom) < LEVEL;
     is_beyond.then(|| {
+        let missed = in_digits(besides, 3);
         let text = format!(
-            "means of darks miss their line over exposure time by {} ADU more than their frames scatter by: the black level moves \
-             between them, exposure times are wrong, or the sensor was warmer for some; intervals of dark current, black level and linearity take that in",
-            in_digits(besides.sqrt(), 3)
+            "means of darks miss their line over exposure time by {missed} ADU more than their frames scatter by{cause}"
         );
         (text, true)
     })
