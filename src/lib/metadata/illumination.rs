@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What light falls on the places of the sensor, as a share of the mean over the frame: means over blocks of photosites, straight between
-/// their centers. By it a frame was divided, with all that single photosites differ by.
+/// What light falls on the places of the sensor, as a share of the mean over the frame: means over blocks of photosites, parabolas
+/// through their centers. By it a frame was divided, with all that single photosites differ by.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Written", into = "Written")]
 pub struct Illumination {
@@ -65,29 +65,39 @@ impl Illumination {
 
     /// The share at a photosite of the sensor; beyond the area as at its edge.
     pub fn at(&self, site: [i32; 2]) -> f64 {
-        let [x, y] = [0, 1].map(|axis| self.between(axis, site[axis]));
-        let of_row = |row: usize| {
-            let [left, right] =
-                [0, 1].map(|step| self.shares[row * self.blocks[0] + (x.0 + step).min(self.blocks[0] - 1)]);
-            left + x.1 * (right - left)
+        let [(column, across), (row, down)] = [0, 1].map(|axis| self.nearest(axis, site[axis]));
+        let of_row = |row: usize| -> f64 {
+            let shares = &self.shares[row * self.blocks[0] + column..];
+            across.iter().zip(shares).map(|(weight, share)| weight * share).sum()
         };
-        let [above, below] = [of_row(y.0), of_row((y.0 + 1).min(self.blocks[1] - 1))];
-        (above + y.1 * (below - above)).max(LEAST)
+        let rows = (row..self.blocks[1]).zip(down);
+        rows.map(|(row, weight)| weight * of_row(row)).sum::<f64>().max(LEAST)
     }
 
-    /// The block before which a place lies or begins, and how far on the way to the next: beyond the centers of the outermost the lines
-    /// go on.
-    fn between(&self, axis: usize, site: i32) -> (usize, f64) {
+    /// The first of the three blocks of a row, or column, that are nearest to a place, and the weights of a parabola through their
+    /// centers: light falls off as one. Of two blocks it is a straight line.
+    fn nearest(&self, axis: usize, site: i32) -> (usize, [f64; 3]) {
         let (count, length) = (self.blocks[axis], f64::from(self.area[axis + 2]));
         let from_edge = (f64::from(site) - f64::from(self.area[axis]) + 0.5).clamp(0.0, length);
         let place = from_edge / length * count as f64 - 0.5;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to a number of blocks")]
-        let first = (place.max(0.0) as usize).min(count.saturating_sub(2));
-        (first, if count > 1 { place - first as f64 } else { 0.0 })
+        match count {
+            1 => (0, [1.0, 0.0, 0.0]),
+            2 => (0, [1.0 - place, place, 0.0]),
+            _ => {
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "from 0 to a number of blocks"
+                )]
+                let middle = (place.round().max(1.0) as usize).min(count - 2);
+                let t = place - middle as f64;
+                (middle - 1, [0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)])
+            }
+        }
     }
 }
 
-/// No place has less light, where lines between blocks would go below zero.
+/// No place has less light, where a parabola would go below zero.
 pub const LEAST: f64 = 1e-3;
 
 #[cfg(test)]
@@ -95,18 +105,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shares_are_straight_between_blocks_and_beyond() {
-        let plane = |x: f64, y: f64| 1.0 + 0.01 * (x - 19.5) - 0.02 * (y - 9.5);
-        let shares = (0..8).map(|index| plane(f64::from(index % 4) * 10.0 + 4.5, f64::from(index / 4) * 10.0 + 4.5));
+    fn shares_are_parabolas_between_blocks_and_beyond() {
+        let falloff = |x: f64, y: f64| 1.0 - 4e-4 * (x - 19.5).powi(2) + 2e-3 * (x - 19.5) - 6e-3 * (y - 9.5);
+        let shares = (0..8).map(|index| falloff(f64::from(index % 4) * 10.0 + 4.5, f64::from(index / 4) * 10.0 + 4.5));
         let light = Illumination::new([100, 50, 40, 20], [4, 2], shares.collect());
         for [x, y] in [[0, 0], [39, 19], [0, 19], [17, 3], [20, 10]] {
-            let wanted = plane(f64::from(x), f64::from(y));
+            let wanted = falloff(f64::from(x), f64::from(y));
             let found = light.at([100 + x, 50 + y]);
             assert!((found - wanted).abs() < 1e-9, "{x} {y}: {found} {wanted}");
         }
         assert_eq!(light.at([99, 50]), light.at([-9, 50]));
         let [least, most] = light.ends();
-        assert!((least - plane(0.0, 19.0)).abs() < 1e-9 && (most - plane(39.0, 0.0)).abs() < 1e-9);
+        assert!((least - falloff(0.0, 19.0)).abs() < 1e-9 && most < falloff(22.0, 0.0) && most > falloff(22.0, 4.0));
         let one = Illumination::new([0, 0, 8, 8], [1, 1], vec![1.0]);
         assert_eq!(one.at([3, 3]), 1.0);
     }

@@ -48,8 +48,10 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
     let leans = others.filter_map(|axis| Lean::of(axis, &lines[axis as usize]));
     let measured = MeasuredLevel { levels, site_adu2: noise.site_adu2, lean: leans.reduce(Lean::larger) };
     let mut notes: Vec<Note> = measured.doubts(frame)?.into_iter().map(Note::Warning).collect();
-    let deltas =
-        along.zip(offs).map(|(axis, offs)| deltas(frame, axis, &offs, options).map(|deltas| (axis, deltas))).transpose()?;
+    let deltas = along
+        .zip(offs)
+        .map(|(axis, offs)| deltas(frame, axis, &offs, options).map(|deltas| (axis, deltas)))
+        .transpose()?;
     let level = BlackLevel::Sites(levels);
     let metadata = &mut frame.metadata;
     metadata.black_noise = Some(noise);
