@@ -189,7 +189,7 @@ fn a_heading_per_watt_says_what_a_response_counts() {
     let doubts = |name: &str| load(name).unwrap().doubts().join("\n");
     let bell = |nm: i32, peak: i32| (-(f64::from(nm - peak) / 40.0).powi(2)).exp();
     let row = |nm: i32| format!("{nm},{:.6},{:.6},{:.6}\n", 0.5 * bell(nm, 600), bell(nm, 540), 0.8 * bell(nm, 460));
-    let rows: String = (380..=780).step_by(10).map(row).collect();
+    let rows: String = (360..=780).step_by(10).map(row).collect();
     bench.write("rel.csv", &format!("nm,R (A/W),G (A/W),B (A/W)\n{rows}"));
     let relative = format!("{HEAD}{READOUT}response:\n  relative_response: {{file: rel.csv}}\n");
     bench.write("rel.yaml", &relative);

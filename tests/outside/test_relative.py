@@ -168,8 +168,7 @@ class Relative(ProgramCase):
         for more, words in (
             ({50728: None}, "nothing tells the white of the exposure"),
             ({52531: signed(WARM)}, "a third illuminant (ColorMatrix3)"),
-            ({**both, 50779: (SHORT, [0])}, "the temperature of an illuminant is not known"),
-            (both, "the temperature of an illuminant is not known"),
+            ({**both, 50778: (SHORT, [0])}, "the temperatures of its illuminants are not known"),
             ({50710: (1, [2, 1, 0])}, "its classes are others than R, G and B"),
             ({50728: ratios([0.0, 1.0, 1.0])}, "AsShotNeutral has a number that is not above 0"),
             ({50721: signed(np.ones((3, 3)))}, "singular"),
@@ -187,6 +186,12 @@ class Relative(ProgramCase):
                 refused = self.attempt(["import-raw", path, "-o", "b.exr", "--write-matrix", "b.yaml"])
                 self.assertEqual(refused.returncode, 1)
                 self.assertIn("a.dng: it tells no matrix", refused.stderr.decode())
+        # Of two, one whose illuminant has a temperature counts alone.
+        for more in (both, {**both, 50779: (SHORT, [0])}):
+            write_dng(path, scene(12), 12, more=more)
+            told = self.attempt(["import-raw", path, "-o", "a.exr", "-v"]).stderr.decode()
+            self.assertIn("its ColorMatrix1 counts alone: the temperature of the other's illuminant is not known", told)
+            self.assertIn("relative_matrix", (self.directory / "a.exr.yaml").read_text(encoding="utf-8"))
         write_dng(path, scene(12), 12, more={50730: (SIGNED, struct.pack("<2i", 1, 4))})
         done = self.attempt(["import-raw", path, "-o", "a.exr", "-v"])
         self.assertIn("its BaselineExposure of 0.25 EV, a hint for pictures, is not applied", done.stderr.decode())

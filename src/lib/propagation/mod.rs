@@ -34,6 +34,7 @@ mod node;
 mod offsets;
 pub mod paper;
 mod pattern;
+mod pattern_nodes;
 pub mod photosite;
 mod pixel_drift;
 mod pixel_gains;

@@ -190,6 +190,53 @@ mod tests {
         }
     }
 
+    fn temporal(site: &Photosite, light_e: f64) -> f64 {
+        site.temporal_variance(light_e, site.moments(light_e).moments.variance)
+    }
+
+    /// Codes of 685 e⁻ beside patterns of many: by a sum over all counts at each of 6000 sensitivities, outside this library. Few hot
+    /// photosites, and small jumps of few, hardly add to it.
+    #[test]
+    fn what_is_drawn_anew_is_told_from_wide_patterns_of_coarse_codes() {
+        for (prnu, expected, most_off) in
+            [(0.1, 0.060_800_7, 1e-4), (0.2, 0.060_798_3, 1e-4), (0.499, 0.061_067_1, 3e-3)]
+        {
+            let with = |tails: Tails| {
+                let mut one = site(0.0, 0.05, [10.0, 0.001_46, 51.0]);
+                one.model.prnu = prnu;
+                one.model.full_well_e = 562_074.0;
+                one.model.tails = tails;
+                temporal(&one, 5448.0) / expected - 1.0
+            };
+            let off = with(Tails::default());
+            assert!(off.abs() < most_off, "{prnu}: {off}");
+            let hot = with(Tails { hot_share: 9e-4, hot_e: 303.0, ..Tails::default() });
+            assert!(hot.abs() < most_off + 1e-3, "{prnu}: {hot}");
+            // Of codes so coarse it goes as the mean difference of two charges, of which jumps of 1.2 σ on average make a third as
+            // much again: 0.005 of it, and half of that is what few amplitudes are good to.
+            let jumps = with(Tails { rts_share: 0.0146, rts_e: 92.0, ..Tails::default() });
+            assert!((jumps - 0.005).abs() < 2.5e-3 + most_off, "{prnu}: {jumps}");
+        }
+    }
+
+    /// Light and dark signal near the top code, with offsets beside: the mean over offsets of what is drawn anew at sensors whose bias is
+    /// off by these.
+    #[test]
+    fn offsets_beside_patterns_at_an_end_leave_what_is_drawn_anew() {
+        let with = |dsnu_e: f64, off_e: f64| {
+            let mut one = site(dsnu_e, 1.2, [12.0, 1.163, 123.0 + 1.163 * off_e]);
+            (one.model.dark_e, one.model.dcnu, one.model.prnu) = (290.0, 0.38, 0.018);
+            temporal(&one, 2861.0)
+        };
+        for dsnu_e in [20.0, 26.0, 60.0] {
+            let places = (-28..=28).map(|step| f64::from(step) * 0.25);
+            let expected: f64 =
+                places.map(|z| 0.25 * crate::numerics::normal::density(z) * with(0.0, dsnu_e * z)).sum();
+            let found = with(dsnu_e, 0.0);
+            assert!((found / expected - 1.0).abs() < 1e-4, "{dsnu_e}: {found} {expected}");
+        }
+    }
+
     /// Mean and variance of a code less the median of five others, at photosites of all offsets, by the probabilities of all codes: the
     /// third of five in rising order reaches a code where three or more do.
     fn less_median_of_five(dsnu_e: f64, read_noise_e: f64, [bits, adu_per_e, bias_adu]: [f64; 3]) -> [f64; 2] {

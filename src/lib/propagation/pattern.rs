@@ -5,18 +5,16 @@
 //! series, to about the cube of their skewness, and rounding, which many counts cover, is a uniform error.
 
 use super::counts::{Charge, Count};
-use super::curved::NODES;
 use super::effort;
 use super::memory::Memory;
 use super::moments::Prediction;
 use super::node::Law;
+use super::pattern_nodes::{Axis, Knee, fine_sensitivities, sensitivities};
 use super::reading::{Asked, Moments, Reading};
 use crate::metadata::PoissonKind;
-use crate::numerics::gauss::{hermite, panel};
 use crate::numerics::medians::median;
-use crate::numerics::normal::{NearlyNormal, cumulative, density};
+use crate::numerics::normal::NearlyNormal;
 use crate::numerics::rounding::REACH;
-use std::sync::LazyLock;
 
 /// What light and dark frames have of the pattern.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,9 +58,6 @@ const AFFORDABLE: usize = 6_000;
 
 /// The same where rounding shows.
 const AFFORDABLE_IF_FINE: usize = 150_000;
-
-/// Sensitivities at most where rounding shows.
-const MOST_IF_FINE: f64 = 4096.0;
 
 /// Counts of a smaller read noise are told apart by this, in e⁻.
 const LEAST_NOISE_E: f64 = 0.1;
@@ -158,151 +153,6 @@ impl Sums {
         let median = dark.median_of.map(|_| Prediction::about(dark.reading.center, &self.moments));
         Shared { light: variance(self.light), dark: variance(self.dark), both, median }
     }
-}
-
-/// The sensitivities of the photosites to one charge, max(0, 1 + σ z).
-#[derive(Debug, Clone, Copy)]
-struct Axis {
-    rate: f64,
-    sigma: f64,
-    is_shot: bool,
-    /// Widest panel, in standard deviations.
-    widest: f64,
-}
-
-/// Where the mean of a reading bends, in standard deviations of the sensitivity, and how wide the bend is.
-#[derive(Debug, Clone, Copy)]
-struct Knee {
-    z: f64,
-    width: f64,
-}
-
-impl Axis {
-    /// Widest panel of what bends at knees alone, in standard deviations.
-    const WIDEST: f64 = 3.0;
-    /// Bends narrower than this are ends of panels.
-    const NARROWEST: f64 = 1e-7;
-
-    fn of(charge: &Charge) -> Self {
-        let rate = charge.rate.max(0.0);
-        let sigma = if rate > 0.0 { charge.pattern } else { 0.0 };
-        Self { rate, sigma, is_shot: charge.shot.is_some(), widest: Self::WIDEST }
-    }
-
-    /// The same for a function that changes over so many electrons wherever it is.
-    fn followed_over(self, std_e: f64) -> Self {
-        let panels = 2.0 * REACH / (3.0 * std_e / self.spread());
-        let widest = 2.0 * REACH / panels.min(MOST_IF_FINE / 12.0);
-        Self { widest: self.widest.min(widest), ..self }
-    }
-
-    /// Standard deviation of what the charge is over photosites, in e⁻.
-    fn spread(&self) -> f64 {
-        self.rate * self.sigma
-    }
-
-    /// Gauss and Hermite's rule for a function that bends only over many standard deviations of the sensitivity, w at least: n nodes are
-    /// off by n!/√(2n)! w⁻²ⁿ of what bends, 2·10⁻¹⁰; none of what bends within less.
-    fn smooth_rule(knees: &[Knee]) -> Option<&'static [(f64, f64)]> {
-        const WIDTHS: [(f64, usize); 3] = [(5.0, 6), (3.0, 8), (2.0, 12)];
-        static RULES: LazyLock<[Vec<(f64, f64)>; 3]> = LazyLock::new(|| WIDTHS.map(|(_, nodes)| hermite(nodes)));
-        let narrowest = knees.iter().map(|knee| knee.width).fold(f64::INFINITY, f64::min);
-        let rule = WIDTHS.iter().position(|(width, _)| narrowest >= *width)?;
-        Some(&RULES[rule])
-    }
-
-    /// Sensitivities and their weights for a function that bends at `knees` and is smooth between: panels that grow with the
-    /// distance from each. Where nothing bends it is straight, unless `is_curved`.
-    fn points(&self, knees: &[Knee], is_curved: bool) -> Vec<(f64, f64)> {
-        if self.sigma <= 0.0 {
-            return vec![(1.0, 1.0)];
-        }
-        let lowest = (-1.0 / self.sigma).max(-REACH);
-        // A mean that follows the charge is a straight line.
-        if knees.is_empty() && lowest <= -REACH && !is_curved {
-            return NODES.iter().map(|(z, weight)| (1.0 + self.sigma * z, *weight)).collect();
-        }
-        if let Some(rule) = Self::smooth_rule(knees).filter(|_| lowest <= -REACH && !is_curved) {
-            return rule.iter().map(|(z, weight)| (1.0 + self.sigma * z, *weight)).collect();
-        }
-        let mut ends = vec![lowest, REACH];
-        let mut end = -REACH;
-        while end < REACH {
-            ends.push(end);
-            end += self.widest;
-        }
-        for knee in knees {
-            ends.push(knee.z);
-            let mut distance = 3.0 * knee.width.max(Self::NARROWEST);
-            while distance < self.widest {
-                ends.extend([knee.z - distance, knee.z + distance]);
-                distance *= 2.5;
-            }
-        }
-        ends.retain(|end| (lowest..=REACH).contains(end));
-        ends.sort_by(f64::total_cmp);
-        ends.dedup_by(|next, kept| *next - *kept < 1e-9);
-        // Those below zero are zero.
-        let mut found = vec![(0.0, cumulative(lowest))];
-        for pair in ends.windows(2) {
-            found.extend(panel(pair[0], pair[1]).map(|(z, weight)| (1.0 + self.sigma * z, weight * density(z))));
-        }
-        found.retain(|(_, weight)| *weight > LEAST_WEIGHT);
-        found
-    }
-}
-
-/// Weights below this do not count.
-const LEAST_WEIGHT: f64 = 1e-17;
-
-/// Sensitivities and their weights, as many as the means over exposures need, which follow them the more steeply the less
-/// temporal noise there is, in e⁻.
-fn sensitivities(charge: &Charge, temporal: f64) -> Vec<(f64, f64)> {
-    sensitivities_by(charge, temporal, 0.02)
-}
-
-/// The same of means that follow every edge of the codes.
-fn fine_sensitivities(charge: &Charge, temporal: f64) -> Vec<(f64, f64)> {
-    sensitivities_by(charge, temporal, 2.0 * 1.3 * REACH / MOST_IF_FINE)
-}
-
-/// Steepness up to which few sensitivities tell a mean: Gauss and Hermite's rule of n nodes is off by n!/(2n)! of its 2n-th power,
-/// 10⁻¹².
-const SHALLOW: f64 = 0.3;
-static FEW: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| hermite(6));
-
-fn sensitivities_by(charge: &Charge, temporal: f64, narrowest: f64) -> Vec<(f64, f64)> {
-    let sigma = charge.pattern;
-    if sigma <= 0.0 || charge.rate <= 0.0 {
-        return vec![(1.0, 1.0)];
-    }
-    let steepness = sigma * charge.rate / temporal;
-    let scale = (1.0 / (1.0 + steepness * steepness).sqrt()).max(narrowest);
-    let lowest = (-1.0 / sigma).max(-REACH);
-    if lowest <= -REACH && steepness <= SHALLOW {
-        return FEW.iter().map(|(z, weight)| (1.0 + sigma * z, *weight)).collect();
-    }
-    if lowest <= -REACH {
-        let step = scale / 1.3;
-        let steps = (REACH / step).ceil();
-        let mut z = -steps * step;
-        let mut found = Vec::new();
-        while z <= steps * step + 0.5 * step {
-            found.push((1.0 + sigma * z, step * density(z)));
-            z += step;
-        }
-        return found;
-    }
-    // Those below zero are zero.
-    let mut found = vec![(0.0, cumulative(lowest))];
-    let panels = ((REACH - lowest) / (3.0 * scale)).ceil();
-    let width = (REACH - lowest) / panels;
-    let mut low = lowest;
-    while low < REACH - 0.5 * width {
-        found.extend(panel(low, low + width).map(|(z, weight)| (1.0 + sigma * z, weight * density(z))));
-        low += width;
-    }
-    found
 }
 
 /// The means that photosites have over exposures, or moments of medians.
@@ -516,6 +366,7 @@ impl<'a> Temporal<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::normal::{cumulative, density};
     use crate::stages::noise::{LineNoise, NoiseModel, Tails};
 
     /// Of dark current that fills three of four wells, and none in one: what is left of the variance beside the pattern is the

@@ -135,7 +135,8 @@ impl Counts {
             (self.negative, "expected signals below zero were taken as zero"),
             (
                 self.undefined_hue,
-                "values had no green to divide by, or lay beyond the range of samples; bilinear ones stand in",
+                "values had no green to divide by, lay beyond the range of samples, or stand beside one that is NaN or infinite; \
+                 bilinear ones stand in",
             ),
             (
                 self.dim_green,

@@ -203,6 +203,7 @@ mod tests {
                 ("correction.masters.average.", field_names::<AverageRecord>()),
                 ("correction.masters.noise.", field_names::<MasterNoise>()),
                 ("correction.flat.", field_names::<FlatRecord>()),
+                ("correction.flat.illumination.", field_names::<Illumination>()),
                 ("correction.defects.", field_names::<DefectsRecord>()),
                 ("demosaic.", field_names::<DemosaicRecord>()),
                 ("color.", field_names::<ColorRecord>()),

@@ -7,12 +7,13 @@
 //! same places, and light that falls off towards the corners is the same share of each.
 
 mod blocks;
+mod means;
 mod tally;
 
 use crate::camera::levels::BlackLevels;
 use crate::error::Result;
 use crate::frame::to_sample;
-use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, Illumination, MasterNoise, Scene};
+use crate::metadata::{AverageRecord, FlatRecord, FrameHeader, MasterNoise, Scene};
 use crate::stages::darks::{DarkFrames, DarkSettings, Fitness, Misfit, check_alike, check_codes, check_setting};
 use crate::stages::defects::{DefectMap, Survey, add};
 use crate::stages::masters::Frames;
@@ -23,6 +24,8 @@ use crate::stream::RowSource;
 use blocks::Blocks;
 use std::ops::Range;
 use tally::Tally;
+
+pub use means::FlatMeans;
 
 /// What no light reads in flats.
 #[derive(Debug)]
@@ -48,36 +51,6 @@ pub struct FlatFrames<S> {
     /// How what comes off goes with the flats.
     fitness: Fitness,
     warnings: Vec<String>,
-}
-
-/// What a first reading of flats tells.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FlatMeans {
-    /// Mean of each class above what no light reads, where all classes are whole, ADU; 0 of a class without a photosite.
-    means: Vec<f64>,
-    /// How many photosites of each class these are the means of, and how many good ones beside them.
-    photosites: Vec<u64>,
-    left_out: Vec<u64>,
-    /// Photosites that are saturated in a flat.
-    pub full: u64,
-    /// Ordinary values of F by class, ADU.
-    limits: Option<Vec<[f64; 2]>>,
-    /// How they were lit.
-    illumination: Illumination,
-    /// What is wrong with the array that they are said to be behind.
-    pub doubt: Option<String>,
-}
-
-impl FlatMeans {
-    /// Ordinary values of F by class, ADU, where defects are looked for.
-    pub fn limits(&self) -> Option<&[[f64; 2]]> {
-        self.limits.as_deref()
-    }
-
-    /// The same with ordinary values of F, ADU by class, beyond which photosites are defective.
-    pub fn within(self, limits: &[[f64; 2]]) -> Self {
-        Self { limits: Some(limits.to_vec()), ..self }
-    }
 }
 
 impl<S: RowSource> FlatFrames<S> {
