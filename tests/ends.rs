@@ -256,6 +256,40 @@ fn random_cameras_are_predicted_as_sums_over_counts_have_it() {
     }
 }
 
+/// Dark current of 32 full wells leaves photosites dark that hold none of it, whatever the pattern of the little light: by a sum over
+/// sensitivities. Shot noise is a hundredth of the ramp up to full well.
+#[test]
+fn photosites_without_dark_current_stay_dark_in_saturated_frames() {
+    let model = NoiseModel { dark_e: 160_000.0, dcnu: 0.3, read_noise_e: 5.0, full_well_e: 5000.0, ..QUIET };
+    let (mut mean, mut square) = (0.0, 0.0);
+    for step in -80_000..80_000 {
+        let z = f64::from(step) * 1e-4;
+        let charge = (40.0 + model.dark_e * (1.0 + model.dcnu * z).max(0.0)).min(model.full_well_e);
+        let weight = 1e-4 * (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+        mean += weight * charge;
+        square += weight * charge * charge;
+    }
+    let std = (square - mean * mean + model.read_noise_e.powi(2)).sqrt();
+    for prnu in [0.0, 0.25, 0.4, 0.6] {
+        let case = Case { model: NoiseModel { prnu, ..model }, adc: PAPER, light_e: 40.0 };
+        let found = case.electrons().moments;
+        let off = [found.mean - mean, found.std() - std];
+        assert!(off[0].abs() < 5e-3 && off[1].abs() < 2e-3 * std, "{prnu}: {off:?}");
+    }
+}
+
+/// Where next to all codes are the top one, a fourth cumulant is what rounding left of it; no law has less than the skewness tells.
+#[test]
+fn no_law_has_less_kurtosis_than_its_skewness_tells() {
+    for light_e in [5300.0, 3900.0, 2400.0] {
+        let model =
+            NoiseModel { dark_e: 80_000.0, dcnu: 0.3, prnu: 0.499, read_noise_e: 47.0, full_well_e: 5300.0, ..QUIET };
+        let found = Case { model, adc: AdcRecord::new(10, 51.0, 70.0), light_e }.codes();
+        let skewness = found.third / found.moments.variance.powf(1.5);
+        assert!(skewness < -100.0 && found.excess_kurtosis >= skewness * skewness - 2.0, "{found:?}");
+    }
+}
+
 /// A count on a lattice of codes, without read noise: ties go up; 20 e⁻ at half a code each give the mean 100 + 10 + ¼.
 #[test]
 fn lattices_and_ties_are_counted() {

@@ -180,8 +180,9 @@ impl Law {
                     [inner, outer] => inner.hypot(outer),
                 };
                 let mean = inner.electrons + outer.electrons;
-                // Below what the charge of the lesser pattern holds there is next to nothing.
-                let floor = match narrow.pattern.total_cmp(&wide.pattern) {
+                // Below what the charge holds that differs less there is next to nothing.
+                let differs = |charge: &Charge| charge.pattern * charge.rate;
+                let floor = match differs(narrow).total_cmp(&differs(wide)) {
                     _ if !self.has_floors() => f64::NEG_INFINITY,
                     Ordering::Greater => outer.electrons,
                     Ordering::Less => inner.electrons,

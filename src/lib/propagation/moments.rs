@@ -48,7 +48,9 @@ impl Prediction {
     /// The prediction of a variable with these cumulants.
     pub fn of_cumulants(mean: f64, variance: f64, third: f64, fourth: f64) -> Self {
         let of_spread = |cumulant: f64| if variance > 0.0 { cumulant } else { 0.0 };
-        let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) } else { 0.0 };
+        // No law has less than its skewness tells [Pearson1916]; a fourth cumulant that rounding has eaten up is no reason to trust in χ².
+        let least = third / variance.powf(1.5);
+        let excess_kurtosis = if variance > 0.0 { (fourth / variance.powi(2)).max(least * least - 2.0) } else { 0.0 };
         Self {
             moments: MeanVariance { mean, variance },
             third: of_spread(third),
