@@ -6,7 +6,7 @@ use crate::metadata::Illumination;
 /// Blocks of a row, and of a column, at most: what light falls off by from one to the next is nearly straight.
 const MOST: usize = 16;
 /// Photosites along the side of a block at least, over which noise averages out.
-const LEAST_SIDE: usize = 16;
+const LEAST_SIDE: usize = 8;
 
 /// Sums over blocks of photosites, of each class apart.
 pub(super) struct Blocks {
@@ -86,7 +86,8 @@ mod tests {
             }
         }
         let light = blocks.illumination(&[100.0, 700.0]);
-        let wanted = Illumination::new([10, 20, 48, 32], [3, 2], vec![0.5, 1.25, 1.25, 0.5, 1.25, 1.25]);
+        let shares = (0..24).map(|block| if block % 6 < 2 { 0.5 } else { 1.25 });
+        let wanted = Illumination::new([10, 20, 48, 32], [6, 4], shares.collect());
         assert_eq!(light, wanted);
     }
 }
