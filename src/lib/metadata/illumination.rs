@@ -51,7 +51,7 @@ impl TryFrom<Written> for Illumination {
 impl Illumination {
     /// That of so many columns and rows of blocks, all of a size, on an area of the sensor.
     pub fn new(area: [i32; 4], blocks: [usize; 2], shares: Vec<f64>) -> Self {
-        Self { area, blocks, shares }
+        Self { area, blocks, shares: shares.into_iter().map(|share| share.max(LEAST)).collect() }
     }
 
     /// The least and the greatest share, of blocks and corners.
@@ -97,8 +97,8 @@ impl Illumination {
     }
 }
 
-/// No place has less light, where a parabola would go below zero.
-pub const LEAST: f64 = 1e-3;
+/// No place has less light, where noise or a parabola would make it so.
+const LEAST: f64 = 1e-3;
 
 #[cfg(test)]
 mod tests {

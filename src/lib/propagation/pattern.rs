@@ -102,11 +102,8 @@ impl Shared {
         }
         let [along_light, along_dark] = [&law.light, &law.dark].map(Axis::of);
         let is_curved = is_fine || light.reading.is_bent() || dark.reading.is_bent();
-        let [along_light, along_dark] = match is_fine {
-            // Means follow every edge of the codes, over what a photosite scatters by.
-            true => [along_light.followed_over(of_light.std()), along_dark],
-            false => [along_light, along_dark],
-        };
+        // Where it shows, means follow every edge of the codes, over what a photosite scatters by.
+        let along_light = if is_fine { along_light.followed_over(of_light.std()) } else { along_light };
         // Bends for the dark signal: of most photosites, of those without light, and of dark frames.
         let mut bends = of_light.knees(along_dark, along_light, 1.0, along_light.spread());
         bends.extend(of_light.knees(along_dark, along_light, 0.0, 0.0));

@@ -149,13 +149,13 @@ impl Photosite {
     /// E v of samples that nothing came off.
     pub(super) fn temporal_variance(&self, expected_e: f64, whole: f64) -> f64 {
         let shows_codes = |adc: &AdcRecord| Dark::mean_of(self.model, 1).std_codes(adc, expected_e) < VISIBLE;
-        let fixed = match self.adc.filter(|adc| self.equations == Equations::Exact && shows_codes(adc)) {
-            Some(_) if self.has_tails() => whole - self.mixed_temporal(expected_e),
-            Some(adc) => self.shared(&adc, (expected_e, None), (self, None), true).light,
-            None => self.fixed_variance(expected_e),
+        let anew = match self.adc.filter(|adc| self.equations == Equations::Exact && shows_codes(adc)) {
+            Some(_) if self.has_tails() => self.mixed_temporal(expected_e),
+            Some(adc) => whole - self.shared(&adc, (expected_e, None), (self, None), true).light,
+            None => whole - self.fixed_variance(expected_e),
         };
         // What takes too long is no number.
-        if (whole - fixed).is_nan() { f64::NAN } else { (whole - fixed).clamp(0.0, whole) }
+        if (whole - anew).is_nan() { f64::NAN } else { anew.clamp(0.0, whole) }
     }
 }
 

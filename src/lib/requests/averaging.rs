@@ -11,6 +11,7 @@ use crate::metadata::{AverageRecord, Coverage, ExposuresRecord, FrameHeader};
 use crate::numerics::averages::{CLIP, Combine, Kept, average};
 use crate::numerics::running::Running;
 use crate::sigma::{PixelLayers, is_layer};
+use crate::stages::darks::Fitness;
 use crate::stages::exposures::{Exposures, too_few};
 use crate::stages::masters::Averaging;
 use crate::stages::saturation::{SATURATED, bits, with_mask};
@@ -197,11 +198,13 @@ impl Average {
             rows.read(count, &mut buffer)?;
             for (index, row) in buffer.chunks_exact(all.geometry.row_samples()).enumerate() {
                 band.extend_from_slice(&row[..kept]);
+                if Fitness::looks_at(y + index) {
+                    levels.take(&row[..kept]);
+                }
                 if let Some(layer) = layer {
                     seen.mark((y + index) * width, &row[layer * width..][..width]);
                 }
             }
-            levels.take(&band);
             match &mut seen.samples {
                 Samples::Mean(running) => running.add(y * kept, &band),
                 Samples::All(stack) => stack.add(&band)?,

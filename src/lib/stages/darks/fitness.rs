@@ -60,7 +60,7 @@ pub enum Misfit {
 
 impl Fitness {
     /// Whether a row is looked at.
-    pub(in crate::stages) fn looks_at(y: usize) -> bool {
+    pub(crate) fn looks_at(y: usize) -> bool {
         (y / 2).is_multiple_of(PAIRS)
     }
 

@@ -6,7 +6,7 @@ mod frames;
 mod stack;
 
 pub(super) use alike::{check_alike, check_codes, check_setting};
-pub(super) use fitness::Fitness;
+pub(crate) use fitness::Fitness;
 pub use fitness::{DRIFT, Misfit};
 pub use frames::{DarkFrames, DarkLimits, LessDarks};
 pub use stack::{DarkSettings, DarkStack};

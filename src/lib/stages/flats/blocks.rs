@@ -48,7 +48,7 @@ impl Blocks {
             let lit = block.iter().zip(means).filter(|((_, count), _)| *count > 0.0);
             let (sum, count) =
                 lit.fold((0.0, 0.0), |all, (of_class, mean)| (all.0 + of_class.0 / mean, all.1 + of_class.1));
-            (count > 0.0).then(|| (sum / count).max(LEAST_SHARE))
+            (count > 0.0).then(|| sum / count)
         };
         let known: Vec<Option<f64>> = self.sums.chunks(self.classes).map(share).collect();
         let columns = self.counts[0];
@@ -63,9 +63,6 @@ impl Blocks {
         Illumination::new(self.area, self.counts, shares.collect())
     }
 }
-
-/// A block is lit at least so, where noise makes it seem darker.
-const LEAST_SHARE: f64 = 0.001;
 
 #[cfg(test)]
 mod tests {
