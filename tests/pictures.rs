@@ -286,14 +286,17 @@ fn a_clean_frame_says_so_and_takes_no_sources() {
 
 /// Writes a spectral image in which all channels of a pixel are alike.
 fn write_spectral(shop: &Workshop, name: &str, unit: Option<&str>, channels: &[&str], rows: &[[f32; 4]]) {
-    let geometry = Geometry::new(4, rows.len(), channels);
+    let samples: Vec<f32> = rows.iter().flat_map(|row| channels.iter().flat_map(|_| *row)).collect();
+    write_planes(shop, name, unit, &Geometry::new(4, rows.len(), channels), &samples);
+}
+
+/// Writes the samples of an image, its channels within rows.
+fn write_planes(shop: &Workshop, name: &str, unit: Option<&str>, geometry: &Geometry, samples: &[f32]) {
     let tags = ExrTags { emissive_units: unit.map(str::to_owned), ..ExrTags::default() };
     let file = fs::File::create(shop.path(name)).unwrap();
     let (kind, compression) = (ExrSamples::F32, ExrCompression::None);
-    let mut writer =
-        ExrWriter::create(file, name, &geometry, kind, compression, Layers::BesideTheImage, &tags).unwrap();
-    let samples: Vec<f32> = rows.iter().flat_map(|row| channels.iter().flat_map(|_| *row)).collect();
-    writer.write(&samples).unwrap();
+    let mut writer = ExrWriter::create(file, name, geometry, kind, compression, Layers::BesideTheImage, &tags).unwrap();
+    writer.write(samples).unwrap();
     writer.finish().unwrap();
 }
 
@@ -327,6 +330,38 @@ fn spectral_images_that_are_too_bright_for_their_unit_are_told() {
             assert_eq!(said.matches("is that its unit?").count(), usize::from(is_told), "{line}: {said}");
         }
     }
+}
+
+/// Planes of zeros beside bright ones are told, of the pixels that are looked at; black pixels are light as any.
+#[test]
+fn spectral_images_that_are_cut_off_are_told() {
+    let shop = Workshop::new();
+    let nm: Vec<f32> = (0..40_u8).map(|band| 400.0 + 10.0 * f32::from(band)).collect();
+    let names: Vec<String> = nm.iter().map(|nm| format!("S0.{nm},000000nm")).collect();
+    let channels: Vec<&str> = names.iter().map(String::as_str).collect();
+    let write = |name: &str, last_nm: f32| {
+        let sky = |nm: f32| if nm <= last_nm { 1e-5 * (nm / 450.0).powf(-3.2) } else { 0.0 };
+        let samples: Vec<f32> = nm.iter().flat_map(|nm| [0.0, sky(*nm)]).collect();
+        let rows = [samples.clone(), samples].concat();
+        write_planes(&shop, name, Some("W.cm^-2.sr^-1.nm^-1"), &Geometry::new(2, 2, &channels), &rows);
+    };
+    write("cut.exr", 600.0);
+    write("whole.exr", 800.0);
+    let fit = ["--method", "max-ign-sppls", "--evaluate"];
+    for (line, whose) in [
+        ("render-radiance FILE -o out.exr", ", the brightest pixel of its first row: "),
+        ("predict-noise FILE --sample 3", ", sample 3: "),
+        (&format!("fit-matrix {} FILE", fit.join(" ")), ", on average: "),
+    ] {
+        let told = format!(
+            "cut.exr{whose}it is exactly 0 from 610 nm on, beside 27 % of its largest, which counts as no light"
+        );
+        let said = shop.said(&line.replace("FILE", "cut.exr"), 0);
+        assert_eq!(said.matches(&told).count(), 1, "{line}: {said}");
+        let said = shop.said(&line.replace("FILE", "whole.exr"), 0);
+        assert!(!said.contains("exactly 0"), "{line}: {said}");
+    }
+    assert!(shop.said("predict-noise whole.exr --sample 0", 0).contains("whole.exr, sample 0: all radiances are 0"));
 }
 
 #[test]

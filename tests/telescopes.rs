@@ -129,6 +129,82 @@ fn what_a_frame_was_taken_as_is_what_it_is_used_as() {
     assert!(dark(&shop, 0).contains("light.fits: no light fell on it: it is a dark frame itself"));
 }
 
+/// A light frame with these cards and a dark one with those.
+fn pair(light: &[(&str, &str)], dark: &[(&str, &str)]) -> Workshop {
+    let shop = night(&[&[DARK, ("EXPTIME", "2.0")], dark].concat());
+    let own = [("EXPTIME", "2.0"), ("IMAGETYP", "'Light Frame'"), ("INSTRUME", "'A'")];
+    write(&shop, "light.fits", [900, 1], &[&own, light].concat());
+    shop
+}
+
+#[test]
+fn frames_of_other_photosites_do_not_go_together() {
+    let subframe = |x: &'static str, y: &'static str| [("XORGSUBF", x), ("YORGSUBF", y)];
+    let [up, down] = ["'BOTTOM-UP'", "'TOP-DOWN'"].map(|order| [("ROWORDER", order)]);
+    let line = "correct-frame light.fits --dark dark.fits -o out.exr";
+    for (light, dark, wanted) in [
+        (
+            &subframe("0", "0")[..],
+            &subframe("32", "0")[..],
+            "dark.fits: it begins at column 32 and row 0 of the sensor, and light.fits at column 0",
+        ),
+        (&subframe("8", "4"), &subframe("8", "6"), "dark.fits: it begins at column 8 and row 6 of the sensor"),
+        (
+            &up,
+            &[],
+            "dark.fits: it does not tell which row it begins with (ROWORDER), and light.fits begins with the lowest",
+        ),
+        (&[], &up, "dark.fits: it begins with the lowest row (ROWORDER), and light.fits does not tell"),
+        (&subframe("8", "4"), &subframe("8", "4"), ""),
+        (&subframe("8", "4"), &[], ""),
+        (&up, &up, ""),
+        (&up, &down, ""),
+        (&down, &[], ""),
+    ] {
+        let shop = pair(light, dark);
+        let status = if wanted.is_empty() { 0 } else { BAD_DATA };
+        let said = shop.said(line, status);
+        assert!(said.contains(wanted), "{light:?}, {dark:?}: {said}");
+        // What was converted still tells it.
+        for name in ["light", "dark"] {
+            shop.said(&format!("import-raw {name}.fits -o {name}.tiff"), 0);
+        }
+        let said = shop.said(&line.replace("fits", "tiff"), status);
+        assert!(said.contains(&wanted.replace("fits", "tiff")), "{light:?}, {dark:?}: {said}");
+        let status = shop.attempt("average-frames light.fits dark.fits -o out.exr", &[]).status.success();
+        assert!(wanted.is_empty() || !status);
+    }
+}
+
+#[test]
+fn what_came_off_already_comes_off_no_more() {
+    let calibrated = |steps: &'static str| [("CALSTAT", steps)];
+    let raw: &[(&str, &str)] = &[];
+    for (light, dark, wanted) in [
+        (&calibrated("'BD'")[..], raw, "light.fits: its file tells that a bias was taken off"),
+        (&calibrated("'D'"), raw, "light.fits: its file tells that a dark was taken off"),
+        (raw, &calibrated("'B'"), "dark.fits: its file tells that a bias was taken off"),
+        (&calibrated("'B'"), raw, "light.fits: its file tells that a bias was taken off"),
+        (&calibrated("'B'"), &calibrated("'B'"), ""),
+        (&calibrated("'F'"), raw, ""),
+    ] {
+        let shop = pair(light, dark);
+        let status = if wanted.is_empty() { 0 } else { BAD_DATA };
+        let said = shop.said("correct-frame light.fits --dark dark.fits -o out.exr", status);
+        assert!(said.contains(wanted), "{light:?}, {dark:?}: {said}");
+    }
+    let shop = pair(&calibrated("'BDF'"), raw);
+    write(&shop, "flat.fits", [800, 4], &[("IMAGETYP", "'Flat'"), ("INSTRUME", "'A'")]);
+    let divided = shop.said("correct-frame light.fits --black 0 --flat flat.fits -o out.exr", BAD_DATA);
+    assert!(
+        divided.contains("that a flat was taken off or divided out before")
+            && divided.contains("it is divided by a flat"),
+        "{divided}"
+    );
+    let stack = pair(&[("STACKCNT", "20")], raw).said("measure light.fits", 0);
+    assert!(stack.contains("light.fits: it is combined of 20 exposures (STACKCNT), and nothing tells how"), "{stack}");
+}
+
 #[test]
 fn a_copy_of_the_frame_corrects_nothing() {
     let shop = night(&[DARK]);

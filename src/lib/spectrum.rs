@@ -132,10 +132,24 @@ impl Curve {
         &self.wavelength_nm
     }
 
+    /// The curve with zeros for what is below zero by no more than the rounding of its largest value, as sums leave it.
+    #[must_use]
+    pub fn without_rounding(mut self) -> Self {
+        self.values = rounded_to_zero(self.values);
+        self
+    }
+
     /// The smallest and the largest value.
     pub fn extremes(&self) -> (f64, f64) {
         self.values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
     }
+}
+
+/// Values with zeros for what is below zero by no more than the rounding of the largest.
+pub fn rounded_to_zero(mut values: Vec<f64>) -> Vec<f64> {
+    let least = -f64::EPSILON * values.iter().copied().fold(0.0, f64::max);
+    values.iter_mut().filter(|value| (least..0.0).contains(*value)).for_each(|value| *value = 0.0);
+    values
 }
 
 /// Checks that wavelengths are positive, finite and strictly ascending.

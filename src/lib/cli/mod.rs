@@ -95,8 +95,8 @@ pub fn start<A: CommandFactory + FromArgMatches>(
     }
 }
 
-/// What `--version` says behind the name of a program: the project, its version, and the commit that the build was told in
-/// `CYANOMETER_COMMIT`. To look for it in every build would cost a new one after each commit.
+/// What `--version` says behind the name of a program: the project, its version, and the commit that `build.rs` found for a
+/// release, or that the build was told in `CYANOMETER_COMMIT`.
 fn version(program: &str) -> &'static str {
     let project = if program == env!("CARGO_PKG_NAME") { "" } else { concat!("(", env!("CARGO_PKG_NAME"), ") ") };
     let commit = option_env!("CYANOMETER_COMMIT").filter(|commit| !commit.is_empty());

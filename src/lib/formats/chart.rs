@@ -1,5 +1,6 @@
 //! Tables of charts: what a camera read of patches, and the colors that they have.
 
+use super::cells::numeric;
 use super::csv::{SpectralTable, columns, text_column};
 use super::data;
 use super::files::read_file;
@@ -158,9 +159,7 @@ pub fn load_patches(path: &Path) -> Result<PatchMeans> {
 /// Three columns of numbers, row by row.
 fn three_columns(name: &str, bytes: &[u8], wanted: [&str; 3]) -> Result<Vec<[f64; 3]>> {
     let number = |column: &str, (row, text): (usize, String)| {
-        text.parse()
-            .ok()
-            .filter(|value: &f64| value.is_finite())
+        numeric(text.trim())
             .ok_or_else(|| Error::format(name, format!("row {}: `{column}` is `{text}`, which is no number", row + 1)))
     };
     let column = |column: &str| -> Result<Vec<f64>> {

@@ -5,7 +5,7 @@
 //! nm. What parts cells and what is a comment, `delimited` tells.
 
 use super::cells::{Cells, MAX_COLUMNS, Text, numeric, unpacked};
-use super::cut_off;
+use super::cut_off::doubt_of_radiances;
 use super::delimited::{self, MAX_COMMENTS};
 use super::described::Columns;
 use super::factors::doubt_of_factor;
@@ -36,6 +36,9 @@ pub fn columns(name: &str, bytes: &[u8]) -> Result<Vec<String>> {
     let text = Text::of(name, bytes, false)?;
     let mut reader = text.reader(true);
     let headers = reader.headers().map_err(|error| csv_complaint(name, text.rows(), &error))?;
+    if headers.is_empty() {
+        return Err(Error::format(name, "it is empty; a table with a row of headings is wanted"));
+    }
     Ok(headers.iter().take(MAX_COLUMNS).map(ToOwned::to_owned).collect())
 }
 
@@ -385,20 +388,11 @@ impl SpectralTable {
 
     /// A warning of values in a curve of radiances that no light has: below zero, nothing but zeros, or cut off to zeros.
     pub fn doubt_of_values(&self, index: usize) -> Option<String> {
-        let values = self.values.row(index);
-        let count = values.iter().filter(|value| **value < 0.0).count();
-        let least = values.iter().copied().fold(0.0, f64::min);
-        let which = if self.columns.len() > 1 { format!("`{}`: ", self.columns[index]) } else { String::new() };
-        if values.iter().all(|value| *value == 0.0) {
-            return Some(format!("{}: {which}all radiances are 0: is it the right column?", self.name));
-        }
-        if count > 0 {
-            let (name, all) = (&self.name, values.len());
-            return Some(format!(
-                "{name}: {which}{count} of {all} radiances are below 0, down to {least}, which no light is"
-            ));
-        }
-        cut_off::doubt(&self.wavelength_nm, &values.to_vec()).map(|doubt| format!("{}: {which}{doubt}", self.name))
+        let which = if self.columns.len() > 1 { format!(": `{}`", self.columns[index]) } else { String::new() };
+        let values = self.values.row(index).to_vec();
+        let doubt = doubt_of_radiances(&format!("{}{which}", self.name), &self.wavelength_nm, &values);
+        let is_none = values.iter().all(|value| *value == 0.0);
+        doubt.map(|doubt| if is_none { format!("{doubt}: is it the right column?") } else { doubt })
     }
 }
 

@@ -1,4 +1,4 @@
-//! Zeros in a spectrum that stand for what was not measured: at an end that is cut off, or in a gap.
+//! Radiances that no light has, and zeros that stand for what was not measured: at an end that is cut off, or in a gap.
 
 use crate::spectrum::WavelengthGrid;
 use crate::text::about;
@@ -9,9 +9,23 @@ const LEAST_SHARE: f64 = 0.1;
 /// So many rows beside zeros are a spectrum: fewer may be lines, or a step made by hand.
 const LEAST_ROWS: usize = 8;
 
+/// A warning of the radiances of `whose` spectrum: below zero, nothing but zeros, or cut off to zeros.
+pub fn doubt_of_radiances(whose: &str, wavelength_nm: &[f64], values: &[f64]) -> Option<String> {
+    let count = values.iter().filter(|value| **value < 0.0).count();
+    let least = values.iter().copied().fold(0.0, f64::min);
+    if values.iter().all(|value| *value == 0.0) {
+        return Some(format!("{whose}: all radiances are 0"));
+    }
+    if count > 0 {
+        let all = values.len();
+        return Some(format!("{whose}: {count} of {all} radiances are below 0, down to {least}, which no light is"));
+    }
+    doubt(wavelength_nm, values).map(|doubt| format!("{whose}: {doubt}"))
+}
+
 /// A warning of zeros beside large values of a curve, inside the wavelengths that light is summed over; none of lines, which have few rows,
 /// and of steps, which are level.
-pub(super) fn doubt(wavelength_nm: &[f64], values: &[f64]) -> Option<String> {
+fn doubt(wavelength_nm: &[f64], values: &[f64]) -> Option<String> {
     let largest = values.iter().copied().fold(0.0, f64::max);
     let WavelengthGrid { start_nm, end_nm, .. } = WavelengthGrid::default();
     let is_seen = |place: usize| wavelength_nm[place] > start_nm && wavelength_nm[place] < end_nm;

@@ -1,5 +1,6 @@
 //! Lists of flats and darks: a table, a YAML list, or the descriptor of an EMVA 1288 measurement.
 
+use super::cells::numeric;
 use super::files::read_file;
 use super::{csv, delimited, keys, register, table, yaml};
 use crate::camera::optics::doubt_of_time;
@@ -7,7 +8,7 @@ use crate::camera::readout::LEAST_TEMPERATURE_K;
 use crate::error::{Error, Result};
 use crate::names::{Named, serde_by_name};
 use serde::{Deserialize, Serialize};
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
 /// What a frame of a measurement shows.
@@ -33,8 +34,7 @@ impl Named for FrameKind {
 }
 
 /// A frame as a list has it; what it does not say, the frame's own metadata may.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ListedFrame {
     /// The file, as seen from the list.
     pub file: PathBuf,
@@ -56,6 +56,9 @@ pub struct ListedFrame {
     /// Any word that tells levels of light of one exposure time apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub level: Option<String>,
+    /// What a list of YAML says beside, such as notes.
+    #[serde(flatten)]
+    pub beside: serde_yaml::Mapping,
 }
 
 /// A list of frames, and what it says of all.
@@ -98,7 +101,9 @@ pub fn read(path: &Path) -> Result<FrameList> {
     } else if is_yaml(path, &text) {
         let is_plain = text.lines().any(|line| line.starts_with('-'));
         let whole = if is_plain { format!("frames:\n{text}") } else { text.into_owned() };
-        yaml::parse_strict(&name, whole.as_bytes())?
+        let list: FrameList = yaml::parse_strict(&name, whole.as_bytes())?;
+        check_names(&name, "key", &keys_of(&list.frames))?;
+        list
     } else {
         FrameList { frames: of_table(&name, &bytes)?, white_level_adu: None }
     };
@@ -179,6 +184,13 @@ fn check(name: &str, frame: &ListedFrame) -> Result<()> {
     }
 }
 
+/// The keys that frames of a list of YAML have.
+fn keys_of(frames: &[ListedFrame]) -> Vec<String> {
+    let mappings = frames.iter().filter_map(|frame| serde_yaml::to_value(frame).ok()?.as_mapping().cloned());
+    let keys = mappings.flat_map(|told| told.into_iter().map(|(key, _)| key.as_str().unwrap_or("?").to_owned()));
+    keys.collect::<BTreeSet<String>>().into_iter().collect()
+}
+
 /// How words begin by which people call columns, the columns of a list that have that, and what is to be known of these.
 const MEANT: [(&[&str], &[&str], &str); 7] = [
     (&["note", "comment", "remark", "description", "operator", "date", "timestamp"], &[], ""),
@@ -190,12 +202,13 @@ const MEANT: [(&[&str], &[&str], &str); 7] = [
     (&["level", "light", "step"], &["level"], ""),
 ];
 
-/// Refuses columns that are not known; those of notes, and of what a known column beside them has, are left alone, with a warning.
-fn check_columns(name: &str, columns: &[String]) -> Result<()> {
+/// Refuses columns of a table, or keys, that are not known; those of notes, and of what a known one beside them has, are left alone,
+/// with a warning.
+fn check_names(name: &str, what: &str, names: &[String]) -> Result<()> {
     let is = |column: &str, word: &str| column.trim().eq_ignore_ascii_case(word);
     let is_known = |word: &str| COLUMNS.iter().any(|known| is(word, known));
     let mut ignored = Vec::new();
-    for unknown in columns.iter().filter(|column| !is_known(column)) {
+    for unknown in names.iter().filter(|column| !is_known(column)) {
         let words = unknown.to_lowercase();
         let words = words.split(|c: char| !c.is_alphanumeric());
         let is_called = |called: &[&str]| words.clone().any(|word| called.iter().any(|start| word.starts_with(start)));
@@ -204,28 +217,26 @@ fn check_columns(name: &str, columns: &[String]) -> Result<()> {
         let advice = match meant {
             _ if are_blank => ", parted by commas, semicolons or tabs".to_owned(),
             // Of notes, and beside the column that is meant, nothing is lacking.
-            Some((_, own, _))
-                if own.is_empty() || columns.iter().any(|column| own.iter().any(|own| is(column, own))) =>
-            {
+            Some((_, own, _)) if own.is_empty() || names.iter().any(|column| own.iter().any(|own| is(column, own))) => {
                 ignored.push(format!("`{unknown}`"));
                 continue;
             }
             Some((_, own, numbers)) => format!("; call this one `{}`{numbers}, or leave it out", own.join("` or `")),
             None => "; leave this one out, or call it `note`".to_owned(),
         };
-        let problem = format!("unknown column `{unknown}`; a list of frames has {}{advice}", COLUMNS.join(", "));
+        let problem = format!("unknown {what} `{unknown}`; a list of frames has {}{advice}", COLUMNS.join(", "));
         return Err(Error::format(name, problem));
     }
     if !ignored.is_empty() {
-        let are = if ignored.len() == 1 { "column is" } else { "columns are" };
-        register::doubt(format!("{name}: the {are} not looked at: {}", ignored.join(", ")));
+        let are = if ignored.len() == 1 { " is" } else { "s are" };
+        register::doubt(format!("{name}: the {what}{are} not looked at: {}", ignored.join(", ")));
     }
     Ok(())
 }
 
 fn of_table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
     let columns = csv::columns(name, bytes)?;
-    check_columns(name, &columns)?;
+    check_names(name, "column", &columns)?;
     let column = |wanted: &str| -> Result<Option<Vec<String>>> {
         let found = columns.iter().find(|column| column.trim().eq_ignore_ascii_case(wanted));
         found.map(|column| csv::text_column(name, bytes, column)).transpose()
@@ -236,7 +247,7 @@ fn of_table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
         let Some(cells) = column(wanted)? else { return Ok(vec![None; files.len()]) };
         let read = |(row, cell): (usize, &String)| match cell.trim() {
             "" => Ok(None),
-            cell => delimited::number(cell).or_else(|| delimited::decimal(cell)).map(Some).ok_or_else(|| {
+            cell => numeric(cell).map(Some).ok_or_else(|| {
                 Error::format(name, format!("`{cell}` in row {} of `{wanted}` is not a number", row + 1))
             }),
         };
@@ -262,6 +273,7 @@ fn of_table(name: &str, bytes: &[u8]) -> Result<Vec<ListedFrame>> {
             temperature_k: kelvin[row],
             temperature_c: celsius[row],
             level,
+            ..ListedFrame::default()
         })
     };
     files.iter().enumerate().map(frame).collect()
@@ -294,7 +306,7 @@ fn descriptor(name: &str, text: &str) -> Result<FrameList> {
         let words: Vec<&str> = rest.split_whitespace().collect();
         let value = |index: usize| {
             let cell = words.get(index).copied().unwrap_or_default();
-            delimited::number(cell).or_else(|| delimited::decimal(cell)).ok_or_else(|| wrong("a number is missing"))
+            numeric(cell).ok_or_else(|| wrong("a number is missing"))
         };
         match sign {
             "v" => {}
@@ -317,9 +329,8 @@ fn descriptor(name: &str, text: &str) -> Result<FrameList> {
                     kind: Some(kind),
                     exposure_s: Some(exposure_s),
                     photons,
-                    temperature_k: None,
-                    temperature_c: None,
                     level: Some(level),
+                    ..ListedFrame::default()
                 };
                 list.frames.push(frame);
             }
@@ -353,8 +364,7 @@ mod tests {
             exposure_s: Some(0.01),
             photons,
             temperature_k: Some(293.15),
-            temperature_c: None,
-            level: None,
+            ..ListedFrame::default()
         };
         assert_eq!(
             list.frames,
@@ -435,6 +445,9 @@ mod tests {
             let frames = read(&path).unwrap_or_else(|error| panic!("{head}: {error}")).frames;
             assert_eq!((frames.len(), frames[0].exposure_s), (1, Some(0.02)), "{head}");
         }
+        let (_folder, path) =
+            written("list.yaml", "- file: a\n  exposure_s: 0.02\n  note: 20\n  date: {taken: 2026}\n");
+        assert_eq!(read(&path).unwrap().frames[0].exposure_s, Some(0.02));
     }
 
     #[test]
@@ -461,6 +474,13 @@ mod tests {
             ("list.csv", "file,exposure_s\na,-1\n", "`exposure_s` of a is -1; it must be above 0"),
             ("list.csv", "file,kind,photons\na,dark,5\n", "a is a dark with 5 photons"),
             ("list.csv", "file,exposure_s\na,fast\n", "`fast` in row 1 of `exposure_s` is not a number"),
+            ("list.yaml", "- file: a\n  texp: 1\n", "unknown key `texp`; a list of frames has file, kind, exposure_s"),
+            ("list.yaml", "- file: a\n  texp: 1\n", "level; call this one `exposure_s`, in s (20 ms are 0.02)"),
+            (
+                "list.yaml",
+                "- file: a\n  exposure_s: fast\n",
+                "`frames[0].exposure_s` is `fast`, not a number (line 3, column 15)",
+            ),
             ("data.txt", "n 12 640 480\ni a.png\n", "line 2, `i a.png`: an image stands before any line"),
             ("data.txt", "n 40 640 480\nb 1 2\n", "the bits of a sample are 1 to 16"),
         ] {

@@ -5,7 +5,7 @@ pub mod cameras;
 mod cells;
 pub mod chart;
 pub mod csv;
-mod cut_off;
+pub mod cut_off;
 pub mod data;
 mod delimited;
 mod described;

@@ -5,7 +5,7 @@ use super::response_import::{self, Samples};
 use super::wavelengths::check_nm;
 use crate::cfa::Class;
 use crate::error::{Error, Result};
-use crate::spectrum::{Curve, not_in_order};
+use crate::spectrum::{Curve, not_in_order, rounded_to_zero};
 use crate::units::{OtherUnit, Stated};
 
 /// Fewer wavelengths follow no filter of a camera.
@@ -58,7 +58,7 @@ impl ResponseTable {
         }
         let mut checked = Self::checked(name, table.wavelength_nm.clone(), values)?;
         for (class, place) in checked.classes.iter_mut().zip(places) {
-            *class = table.curve_at(place)?;
+            *class = table.curve_at(place)?.without_rounding();
         }
         checked.doubts.extend(told);
         let is_per_watt =
@@ -76,6 +76,7 @@ impl ResponseTable {
                 wavelength_nm.len()
             ));
         }
+        let values = values.map(rounded_to_zero);
         let ends = [wavelength_nm[0], wavelength_nm[wavelength_nm.len() - 1]];
         let mut cut = Vec::new();
         for (class, values) in Class::ALL.into_iter().zip(&values) {
@@ -291,6 +292,15 @@ mod tests {
         assert!(complaint(negative).contains("a response is not negative"));
         let micrometers = rows.iter().map(|row| row.replacen('"', "\"0.", 1)).collect();
         assert!(complaint(micrometers).contains("looks like micrometers"));
+    }
+
+    /// Sums of what is zero leave less than the rounding of the rest.
+    #[test]
+    fn what_rounding_leaves_below_zero_is_zero() {
+        let rows =
+            |least: &str| table("R,G,B", BELLS, [400, 700]).replacen("\n400,", &format!("\n399,{least},0,0\n400,"), 1);
+        assert_eq!(parse(&rows("-1.6e-22"), None).unwrap().classes[0].extremes().0, 0.0);
+        assert!(parse(&rows("-1.6e-12"), None).unwrap_err().contains("a response is not negative"));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 use super::cells::MAX_CELLS;
 use super::csv::SpectralTable;
+use super::cut_off::doubt_of_radiances;
 use super::data::{near_spectrum, spectrum_file, without_data};
 use super::files::{named, near_file, open_named, read_table, spool};
 use super::format::HEAD_BYTES;
@@ -17,7 +18,7 @@ use crate::spectrum::{
 };
 use crate::stream::{RowSource, fold};
 use crate::units::{Any, OtherUnit, RadianceUnit, Stated, unit_of_heading};
-use ndarray::{Array2, ArrayView1};
+use ndarray::{Array2, ArrayView1, Axis};
 use std::io::{self, Read, Seek};
 use std::path::Path;
 
@@ -222,6 +223,13 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
         }
         None => {
             warnings.extend(negative(&name, &library.radiance));
+            if let Some(mean) = library.radiance.mean_axis(Axis(0)) {
+                warnings.extend(doubt_of_radiances(
+                    &format!("{name}, on average"),
+                    &library.wavelength_nm,
+                    &mean.to_vec(),
+                ));
+            }
             Ok((library, warnings))
         }
     }

@@ -1,6 +1,7 @@
 //! What is known about a frame: its quantity, its camera, and everything that was done to it.
 
 mod black_noise;
+mod capture;
 mod converter;
 mod correction;
 mod difference;
@@ -11,6 +12,7 @@ mod ranges;
 mod records;
 
 pub use black_noise::BlackNoise;
+pub use capture::{CaptureRecord, FirstRow};
 pub use converter::AdcRecord;
 pub use correction::{
     AverageRecord, CorrectionRecord, DefectsRecord, DrawnExposures, ExposureSet, ExposuresRecord, FlatRecord,
@@ -96,6 +98,9 @@ pub struct Metadata {
     /// What else the camera was set to, as its file tells it in units of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_settings: Option<CameraSettings>,
+    /// How the program that took the frame stored it, as its file tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub capture: Option<CaptureRecord>,
     /// How a picture is turned to be seen upright, as Exif numbers it, 1 to 8; rows and columns are those of the sensor all the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation: Option<u16>,
@@ -208,6 +213,7 @@ impl Metadata {
             camera: None,
             iso_speed: None,
             camera_settings: None,
+            capture: None,
             orientation: None,
             noise_profile: None,
             sensor_temperature_k: None,

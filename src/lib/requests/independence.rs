@@ -138,6 +138,7 @@ impl Company {
                 }
             }
         }
+        self.check_capture()?;
         for (index, (role, frame)) in self.0.iter().enumerate() {
             for (other_role, other) in self.0[..index].iter().filter(|(other, _)| !other.may_be(*role)) {
                 let (name, its) = (&frame.name, &other.name);
@@ -161,6 +162,47 @@ impl Company {
         }
         warnings.extend(self.long_biases());
         Ok(warnings)
+    }
+
+    /// Makes sure that frames show the same photosites, and that what their files tell to have come off is not taken off again.
+    fn check_capture(&self) -> Result<()> {
+        let told = || self.0.iter().filter_map(|(role, frame)| Some((*role, frame, frame.metadata.capture.as_ref()?)));
+        let Some((_, first, capture)) = told().next() else { return Ok(()) };
+        for (_, frame, other) in told() {
+            if let Some(problem) = other.misfit(capture, &first.name) {
+                return Err(frame.refuse(problem));
+            }
+        }
+        let has = |roles: &[Role]| self.0.iter().any(|(role, _)| roles.contains(role));
+        // Without its bias a dark comes off what has lost its own.
+        let is_biased = |roles: [Role; 2]| {
+            let is_so =
+                |frame: &FrameHeader| frame.metadata.capture.as_ref().is_some_and(|told| told.is_calibrated('B'));
+            !has(&[Role::Bias]) && self.0.iter().filter(|(role, _)| roles.contains(role)).all(|(_, frame)| is_so(frame))
+        };
+        let [lights, flats] = [[Role::Light, Role::Dark], [Role::Flat, Role::FlatDark]];
+        let comes_off = |role: Role, letter: char| match (role, letter) {
+            (role, 'B') if [lights, flats].iter().any(|roles| roles.contains(&role) && is_biased(*roles)) => None,
+            (Role::Light, 'B' | 'D') => has(&[Role::Dark, Role::Bias]).then_some("a dark or bias frame comes off it"),
+            (Role::Light, 'F') => has(&[Role::Flat]).then_some("it is divided by a flat"),
+            (Role::Flat, 'B' | 'D') => has(&[Role::FlatDark]).then_some("a dark frame comes off it"),
+            (Role::Flat, 'F') => Some("it is to divide others"),
+            (Role::Dark | Role::FlatDark | Role::Bias, 'B') => Some("its level is to come off others"),
+            (Role::Dark | Role::FlatDark | Role::Bias, 'D') => Some("its dark signal is to come off others"),
+            _ => None,
+        };
+        let steps = [('B', "a bias"), ('D', "a dark"), ('F', "a flat")];
+        for (role, frame, capture) in told() {
+            let twice = steps.into_iter().filter(|(letter, _)| capture.is_calibrated(*letter));
+            if let Some((step, what)) = twice.filter_map(|(letter, step)| Some((step, comes_off(role, letter)?))).next()
+            {
+                return Err(frame.refuse(format!(
+                    "its file tells that {step} was taken off or divided out before (CALSTAT, `capture.calibrated`), and {what}: give the \
+                     frame as the camera wrote it, or leave that step out"
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// Whether the dark frames of the flats are those that come off the frame; none where some are.

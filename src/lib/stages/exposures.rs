@@ -171,6 +171,7 @@ fn camera(frame: &FrameHeader) -> Metadata {
         camera: known.camera,
         iso_speed: known.iso_speed,
         camera_settings: known.camera_settings,
+        capture: known.capture,
         exposure: known.exposure,
         taken_as: known.taken_as,
         adc: known.adc,

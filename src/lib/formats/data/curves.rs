@@ -103,7 +103,7 @@ impl Curves<'_> {
             Share::QuantumEfficiency => "quantum_efficiency",
             Share::Transmittance => "cover_glass",
         };
-        within_unit(self.sensor, key, table.curve_at(index)?)
+        within_unit(self.sensor, key, table.curve_at(index)?.without_rounding())
     }
 
     /// Relative responses, which are of R, G and B alone, and the heading that says that they count energy.

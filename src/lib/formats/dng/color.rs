@@ -1,5 +1,6 @@
 //! The matrix of a DNG for relative XYZ \[DNG2023, ch. 6].
 
+use super::illuminants;
 use super::image::RawImage;
 use super::tags::{self, DngTag};
 use crate::color;
@@ -13,31 +14,6 @@ use crate::metadata::RelativeMatrix;
 use crate::names::Named;
 use nalgebra::Matrix3;
 use std::path::Path;
-
-/// Numbers of illuminants (Exif, LightSource) and their temperatures, K, as Adobe's DNG SDK has them: of fluorescent lamps
-/// the middle of their range.
-const ILLUMINANTS: [(usize, f64); 20] = [
-    (1, 5500.0),
-    (2, 4150.0),
-    (3, 2850.0),
-    (4, 5500.0),
-    (9, 5500.0),
-    (10, 6500.0),
-    (11, 7500.0),
-    (12, 6400.0),
-    (13, 5050.0),
-    (14, 4150.0),
-    (15, 3525.0),
-    (16, 2925.0),
-    (17, 2850.0),
-    (18, 5500.0),
-    (19, 6500.0),
-    (20, 5500.0),
-    (21, 6500.0),
-    (22, 7500.0),
-    (23, 5000.0),
-    (24, 3200.0),
-];
 
 /// The matrix for the light of the exposure, under the scene's own white; none where the file has none. Notes tell why one
 /// that is there is passed over, and what of it does not count.
@@ -208,7 +184,7 @@ fn light(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Li
 }
 
 /// The matrices for one illuminant or two, and the number of the first. Of two, one whose illuminant has no known temperature is passed
-/// over, with a note.
+/// over, with a note; of two such the first counts, as Adobe's DNG SDK has it.
 fn calibration(
     file: &mut TiffFile,
     image: &RawImage,
@@ -234,7 +210,7 @@ fn calibration(
     let [of_camera, of_profile] = tags::CALIBRATION_SIGNATURES;
     let counts = signature(file, of_camera)? == signature(file, of_profile)?;
     let mut set = |index: usize, color_matrix: Matrix3<f64>| -> Result<Illuminated> {
-        let known = tags::CALIBRATION_ILLUMINANTS[index].one(file, directory)?.and_then(temperature_k);
+        let known = illuminants::temperature_of(file, directory, index)?;
         let camera_calibration = calibrations[index].filter(|_| counts).unwrap_or_else(Matrix3::identity);
         let forward_matrix = forwards[index];
         Ok(Illuminated { temperature_k: known.unwrap_or(0.0), color_matrix, camera_calibration, forward_matrix })
@@ -245,19 +221,25 @@ fn calibration(
             sets.push((index + 1, set(index, matrix)?));
         }
     }
-    if sets.len() > 1 && sets.iter().any(|(_, set)| set.temperature_k == 0.0) {
-        sets.retain(|(_, set)| set.temperature_k != 0.0);
-        if let [(kept, _)] = sets[..] {
-            notes.push(format!(
-                "its ColorMatrix{kept} counts alone: the temperature of the other's illuminant is not known (CalibrationIlluminant{})",
-                3 - kept
-            ));
-        }
+    let is_known = |(_, set): &(usize, Illuminated)| set.temperature_k != 0.0;
+    if sets.len() > 1 && !sets.iter().all(is_known) {
+        let why = if sets.iter().any(is_known) {
+            sets.retain(is_known);
+            "the temperature of the other's illuminant is not known"
+        } else {
+            sets.truncate(1);
+            "the temperatures of the illuminants are not known, as of one alone"
+        };
+        let kept = sets[0].0;
+        let tags = if sets[0].1.temperature_k == 0.0 {
+            "CalibrationIlluminant1, CalibrationIlluminant2".to_owned()
+        } else {
+            format!("CalibrationIlluminant{}", 3 - kept)
+        };
+        notes.push(format!("its ColorMatrix{kept} counts alone: {why} ({tags})"));
     }
     let Some(((number, first), second)) = sets.split_first() else {
-        return Ok(Err(
-            "the temperatures of its illuminants are not known (CalibrationIlluminant1, CalibrationIlluminant2)".into(),
-        ));
+        return Ok(Err("it has no color matrix (ColorMatrix1)".into()));
     };
     let analog_balance = tags::ANALOG_BALANCE.exactly::<3>(file, directory)?.unwrap_or([1.0; 3]);
     if !analog_balance.iter().all(|gain| *gain > 0.0) {
@@ -265,11 +247,6 @@ fn calibration(
     }
     let second = second.first().map(|(_, set)| *set);
     Ok(Ok((Calibration { first: *first, second, analog_balance }, *number)))
-}
-
-/// Temperature of an illuminant by its number; none of those that have none.
-pub(in crate::formats) fn temperature_k(number: usize) -> Option<f64> {
-    ILLUMINANTS.into_iter().find(|(known, _)| *known == number).map(|(_, kelvin)| kelvin)
 }
 
 /// Notes what a converter would brighten its picture by.

@@ -9,6 +9,7 @@ mod area;
 mod color;
 mod describe;
 mod digest;
+mod illuminants;
 mod image;
 mod levels;
 mod noise;
@@ -28,9 +29,9 @@ mod written;
 
 pub use area::RawArea;
 pub(super) use area::Rectangle;
-pub(super) use color::temperature_k;
 pub use color::{OwnMatrix, own_matrix};
 pub(super) use describe::exposure_of;
+pub(super) use illuminants::temperature_k;
 pub use read::{DngReader, FORMAT};
 pub(super) use tell::of_exposure;
 pub use write::{DngWriter, check_frame};

@@ -42,6 +42,7 @@ pub(super) const AS_SHOT_WHITE_XY: DngTag = DngTag(50729, "AsShotWhiteXY");
 pub(super) const BASELINE_EXPOSURE: DngTag = DngTag(50730, "BaselineExposure");
 pub(super) const CALIBRATION_ILLUMINANTS: [DngTag; 2] =
     [DngTag(50778, "CalibrationIlluminant1"), DngTag(50779, "CalibrationIlluminant2")];
+pub(super) const ILLUMINANT_DATA: [DngTag; 2] = [DngTag(52533, "IlluminantData1"), DngTag(52534, "IlluminantData2")];
 /// Of the camera, of the profile.
 pub(super) const CALIBRATION_SIGNATURES: [DngTag; 2] =
     [DngTag(50931, "CameraCalibrationSignature"), DngTag(50932, "ProfileCalibrationSignature")];

@@ -28,6 +28,7 @@ struct Image {
 const BYTE: u16 = 1;
 const TEXT: u16 = 2;
 const SHORT: u16 = 3;
+const UNDEFINED: u16 = 7;
 const LONG: u16 = 4;
 const RATIO: u16 = 5;
 const SIGNED_RATIO: u16 = 10;
@@ -154,7 +155,7 @@ impl Image {
 /// One number of a type; of ratios the dividend or the divisor.
 fn number(value: f64, kind: u16, big_endian: bool) -> Vec<u8> {
     let length = match kind {
-        BYTE | TEXT => 1,
+        BYTE | TEXT | UNDEFINED => 1,
         SHORT => 2,
         _ => 4,
     };
@@ -573,7 +574,14 @@ fn matrices_of_unknown_illuminants_are_passed_over() {
     assert!(method.starts_with("ColorMatrix2 of the DNG"), "{method}: {notes}");
     assert!(notes.contains("its ColorMatrix2 counts alone") && notes.contains("(CalibrationIlluminant1)"), "{notes}");
     assert!(illuminants(17.0, 0.0).0.starts_with("ColorMatrix1 of the DNG"));
-    assert!(illuminants(0.0, 255.0).1.contains("the temperatures of its illuminants are not known"));
+    let (method, notes) = illuminants(0.0, 255.0);
+    assert!(method.starts_with("ColorMatrix1 of the DNG"), "{method}: {notes}");
+    assert!(notes.contains("the temperatures of the illuminants are not known, as of one alone"), "{notes}");
+    // x, y of D65.
+    let data = [0, 3127, 10_000, 3290, 10_000].map(u32::to_le_bytes).concat().into_iter().skip(2).map(f64::from);
+    let with_data = both.clone().with(50778, SHORT, &[17.0]).with(50779, SHORT, &[255.0]);
+    let (method, notes) = told(&with_data.with(52534, UNDEFINED, &data.collect::<Vec<_>>()));
+    assert!(method.starts_with("ColorMatrix1 and ColorMatrix2 of the DNG"), "{method}: {notes}");
     assert!(told(&both.clone().without(50721).with(50779, SHORT, &[21.0])).0.starts_with("ColorMatrix2 of the DNG"));
     let long = told(&image.clone().with(50721, SIGNED_RATIO, &[1.0; 24]));
     assert!(long.0.is_empty() && long.1.contains("its tag ColorMatrix1 has more than 9 numbers"), "{}", long.1);

@@ -5,7 +5,7 @@ use super::units::{LENGTH, TEMPERATURE, TIME, number_of};
 use crate::camera::readout::LEAST_TEMPERATURE_K;
 use crate::cfa::FilterArray;
 use crate::formats::exposure::{self, ToldExposure};
-use crate::metadata::{CameraSettings, Metadata, TakenAs};
+use crate::metadata::{CameraSettings, CaptureRecord, FirstRow, Metadata, TakenAs};
 use crate::text::{in_decimals, in_digits, visible};
 use crate::units::QuantityKind;
 use std::ops::RangeInclusive;
@@ -40,7 +40,7 @@ pub(super) struct Told {
 pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     let (mut notes, mut doubts) = (Vec::new(), doubts_of_repeated(header));
     doubts.extend(doubt_of_primary(header));
-    let is_bottom_up = is_bottom_up(header, &mut notes, &mut doubts);
+    let first_row = first_row(header, &mut notes, &mut doubts);
     let cfa = filters(header, channels, &mut notes, &mut doubts);
     let unit = header.text("BUNIT").map(str::trim).filter(|unit| !unit.is_empty());
     let of_unit = unit.map(quantity_of_unit);
@@ -57,31 +57,64 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     metadata.taken_as = taken_as(header, &mut doubts);
     metadata.sensor_temperature_k = told_temperature(header, &mut notes, &mut doubts);
     metadata.camera_settings = told_settings(header);
+    metadata.capture = Some(CaptureRecord {
+        subframe: subframe(header),
+        first_row: Some(first_row),
+        calibrated: calibrated(header, &mut notes),
+    });
     note_settings(header, &mut notes);
-    Told { metadata, is_bottom_up, notes, doubts }
+    doubts.extend(doubt_of_stack(header));
+    Told { metadata, is_bottom_up: first_row == FirstRow::Bottom, notes, doubts }
 }
 
-/// Whether the first row of the array is the lowest of the picture. Programs write the words with a blank, a line or nothing between.
-fn is_bottom_up(header: &Header, notes: &mut Vec<String>, doubts: &mut Vec<String>) -> bool {
+/// Which row of the picture the array begins with. Programs write the words with a blank, a line or nothing between.
+fn first_row(header: &Header, notes: &mut Vec<String>, doubts: &mut Vec<String>) -> FirstRow {
     let told = header.text("ROWORDER").filter(|order| !order.trim().is_empty());
     let letters =
         |order: &str| order.chars().filter(char::is_ascii_alphabetic).collect::<String>().to_ascii_uppercase();
     match (told, told.map(letters).as_deref()) {
-        (_, Some("TOPDOWN")) => false,
-        (_, Some("BOTTOMUP")) => true,
+        (_, Some("TOPDOWN")) => FirstRow::Top,
+        (_, Some("BOTTOMUP")) => FirstRow::Bottom,
         (Some(other), _) => {
             let other = visible(other);
             doubts.push(format!(
                 "its ROWORDER `{other}` is neither TOP-DOWN nor BOTTOM-UP; its first row is taken as the top one, and its filter array from \
                  there"
             ));
-            false
+            FirstRow::Untold
         }
         _ => {
             notes.push("it has no ROWORDER; its first row is taken as the top one".into());
-            false
+            FirstRow::Untold
         }
     }
+}
+
+/// Column and row of the sensor that the frame begins at; one keyword alone tells the other to be 0.
+fn subframe(header: &Header) -> Option<[i64; 2]> {
+    let [column, row] = ["XORGSUBF", "YORGSUBF"].map(|key| header.number(key).and_then(whole));
+    (column.is_some() || row.is_some()).then(|| [column, row].map(Option::unwrap_or_default))
+}
+
+/// The letters of what came off before, by `CALSTAT` [SBFITSEXT]; of others than B, D and F nothing is known here.
+fn calibrated(header: &Header, notes: &mut Vec<String>) -> Option<String> {
+    let told = header.text("CALSTAT").map(str::trim).filter(|told| !told.is_empty())?;
+    let known: String = told.to_ascii_uppercase().chars().filter(|letter| "BDF".contains(*letter)).collect();
+    if known.is_empty() {
+        notes.push(format!("its CALSTAT `{}` is passed over: B, D and F are known", visible(told)));
+        return None;
+    }
+    Some(known)
+}
+
+/// A warning of a frame that several exposures were combined to, by programs that do not tell how.
+fn doubt_of_stack(header: &Header) -> Option<String> {
+    let told = ["STACKCNT", "NCOMBINE"].into_iter().filter_map(|key| Some((key, header.number(key)?)));
+    let (key, count) = told.into_iter().find(|(_, count)| *count > 1.0)?;
+    Some(format!(
+        "it is combined of {count} exposures ({key}), and nothing tells how: its noise counts as that of one; average-frames combines the \
+         exposures so that its noise is known"
+    ))
 }
 
 /// What samples of a unit are: ADU and electrons, per pixel or not, in the spellings that programs have; unspecified of others.

@@ -188,6 +188,7 @@ mod tests {
                 ("", field_names::<Metadata>()),
                 ("black_noise.", field_names::<BlackNoise>()),
                 ("camera_settings.", field_names::<CameraSettings>()),
+                ("capture.", field_names::<CaptureRecord>()),
                 ("noise_profile.", field_names::<ProfileRecord>()),
                 ("exposure.", field_names::<Exposure>()),
                 ("relative_matrix.", field_names::<RelativeMatrix>()),

@@ -119,7 +119,7 @@ impl TiffFile {
     }
 
     /// An unsigned number of up to eight bytes in the file's byte order.
-    fn number(&self, bytes: &[u8]) -> u64 {
+    pub fn number(&self, bytes: &[u8]) -> u64 {
         let append = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
         if self.big_endian { bytes.iter().fold(0, append) } else { bytes.iter().rev().fold(0, append) }
     }

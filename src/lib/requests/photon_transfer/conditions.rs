@@ -271,15 +271,7 @@ pub fn in_folder(folder: &Path) -> Result<Vec<ListedFrame>> {
         if path.is_dir() {
             found.extend(in_folder(&path)?);
         } else {
-            found.push(ListedFrame {
-                file: path,
-                kind: None,
-                exposure_s: None,
-                photons: None,
-                temperature_k: None,
-                temperature_c: None,
-                level: None,
-            });
+            found.push(ListedFrame { file: path, ..ListedFrame::default() });
         }
     }
     Ok(found)

@@ -166,6 +166,10 @@ impl Scene {
         let Some(sample) = self.spectrum.sample else {
             let (first, radiance) = image.first_row(&spectral)?;
             found.metadata.quadrature_error = seen.quadrature_error(&radiance);
+            if radiance.iter().any(|value| *value != 0.0) {
+                let whose = format!("{}, the brightest pixel of its first row", header.name);
+                found.doubt_of_radiance(&whose, &between.wavelength_nm, &radiance);
+            }
             let rows = ImageRows::Streamed { first, others: Box::new(image) };
             return Ok(Light::Image { rows, factor: 1.0, width, height, source: header.name });
         };
@@ -177,6 +181,7 @@ impl Scene {
         let bright =
             Brightness::of([times_white(brightest)]).judge(&header.name, spectral.unit, spectral.is_assumed)?;
         found.notes.extend(bright.map(Note::Warning));
+        found.doubt_of_radiance(&format!("{}, sample {sample}", header.name), &between.wavelength_nm, &radiance);
         found.metadata.quadrature_error = seen.quadrature_error(&radiance);
         found.radiance = Some(SpectralLibrary::of_one(between.wavelength_nm, radiance));
         Ok(Light::Uniform { electrons, source: format!("{}: sample {sample}", header.name) })

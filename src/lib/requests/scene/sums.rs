@@ -6,6 +6,7 @@ use crate::analysis::characterization::stimuli;
 use crate::camera::optics::Exposure;
 use crate::camera::response::GridWeights;
 use crate::error::Result;
+use crate::formats::cut_off::doubt_of_radiances;
 use crate::formats::data::{self, LoadedSensor};
 use crate::metadata::{Metadata, UpsamplingRecord};
 use crate::numerics::quadrature::Rule;
@@ -35,6 +36,11 @@ impl Found {
     pub(super) fn none() -> Self {
         let metadata = Metadata::new(QuantityKind::ExpectedElectrons);
         Self { metadata, notes: Vec::new(), radiance: None, upsampling: None, losses: Losses::default(), judged: None }
+    }
+
+    /// Notes what no light has in the radiance of a pixel.
+    pub(super) fn doubt_of_radiance(&mut self, whose: &str, wavelength_nm: &[f64], radiance: &[f64]) {
+        self.notes.extend(doubt_of_radiances(whose, wavelength_nm, radiance).map(Note::Warning));
     }
 }
 
