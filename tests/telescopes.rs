@@ -141,6 +141,7 @@ fn pair(light: &[(&str, &str)], dark: &[(&str, &str)]) -> Workshop {
 fn frames_of_other_photosites_do_not_go_together() {
     let subframe = |x: &'static str, y: &'static str| [("XORGSUBF", x), ("YORGSUBF", y)];
     let [up, down] = ["'BOTTOM-UP'", "'TOP-DOWN'"].map(|order| [("ROWORDER", order)]);
+    let untold = [("ROWORDER", "''")];
     let line = "correct-frame light.fits --dark dark.fits -o out.exr";
     for (light, dark, wanted) in [
         (
@@ -151,26 +152,23 @@ fn frames_of_other_photosites_do_not_go_together() {
         (&subframe("8", "4"), &subframe("8", "6"), "dark.fits: it begins at column 8 and row 6 of the sensor"),
         (
             &up,
-            &[],
+            &untold,
             "dark.fits: it does not tell which row it begins with (ROWORDER), and light.fits begins with the lowest",
         ),
-        (&[], &up, "dark.fits: it begins with the lowest row (ROWORDER), and light.fits does not tell"),
+        (&untold, &up, "dark.fits: it begins with the lowest row (ROWORDER), and light.fits does not tell"),
         (&subframe("8", "4"), &subframe("8", "4"), ""),
         (&subframe("8", "4"), &[], ""),
         (&up, &up, ""),
         (&up, &down, ""),
-        (&down, &[], ""),
+        (&down, &untold, ""),
     ] {
         let shop = pair(light, dark);
         let status = if wanted.is_empty() { 0 } else { BAD_DATA };
         let said = shop.said(line, status);
         assert!(said.contains(wanted), "{light:?}, {dark:?}: {said}");
-        // What was converted still tells it.
-        for name in ["light", "dark"] {
-            shop.said(&format!("import-raw {name}.fits -o {name}.tiff"), 0);
+        if wanted.is_empty() {
+            assert!(shop.sidecar("out.exr").capture.is_some());
         }
-        let said = shop.said(&line.replace("fits", "tiff"), status);
-        assert!(said.contains(&wanted.replace("fits", "tiff")), "{light:?}, {dark:?}: {said}");
         let status = shop.attempt("average-frames light.fits dark.fits -o out.exr", &[]).status.success();
         assert!(wanted.is_empty() || !status);
     }

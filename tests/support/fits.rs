@@ -3,7 +3,7 @@
 use super::workshop::Workshop;
 use std::fs;
 
-/// Writes a FITS of 16-bit codes of an array RGGB, `of` column and row, with these cards beside those that all have.
+/// Writes a FITS of 16-bit codes of an array RGGB, `of` column and row, with these cards beside, or in place of, those that all have.
 pub fn write_fits(shop: &Workshop, name: &str, size: [u32; 2], cards: &[(&str, &str)], of: impl Fn(u32, u32) -> f64) {
     let [width, height] = size.map(|side| side.to_string());
     let always = [
@@ -16,7 +16,8 @@ pub fn write_fits(shop: &Workshop, name: &str, size: [u32; 2], cards: &[(&str, &
         ("ROWORDER", "'TOP-DOWN'"),
         ("BAYERPAT", "'RGGB'"),
     ];
-    let cards = always.iter().chain(cards).map(|(key, value)| format!("{:<80}", format!("{key:<8}= {value}")));
+    let others = always.iter().filter(|(key, _)| !cards.iter().any(|(own, _)| own == key));
+    let cards = others.chain(cards).map(|(key, value)| format!("{:<80}", format!("{key:<8}= {value}")));
     let mut bytes: Vec<u8> = cards.chain([format!("{:<80}", "END")]).collect::<String>().into_bytes();
     bytes.resize(bytes.len().next_multiple_of(2880), b' ');
     for [x, y] in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y])) {
