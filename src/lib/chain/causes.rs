@@ -2,6 +2,7 @@
 
 use super::predicted::CauseVariance;
 use crate::propagation::budget::{Budget, Cause};
+use crate::propagation::frame::FixedPart;
 use crate::propagation::gains;
 use crate::propagation::{Equations, FramePrediction, PixelMoments, TappedPixels};
 use nalgebra::Matrix3;
@@ -10,6 +11,8 @@ use nalgebra::Matrix3;
 pub(super) enum Causes {
     /// Of R, G and B.
     Classes(Box<[Budget; 3]>),
+    /// The same with what of the pixels that are made of them is the same in every exposure.
+    Pixels(Box<([Budget; 3], FixedPart)>),
     /// The same behind each amplifier.
     Taps(Vec<(usize, [Budget; 3])>),
 }
@@ -23,8 +26,8 @@ impl Causes {
         equations: Equations,
     ) -> Vec<CauseVariance> {
         match (self, prediction) {
-            (Self::Classes(causes), FramePrediction::Pixels(mixture)) if equations == Equations::Exact => {
-                of_pixels(mixture, causes, covariance)
+            (Self::Pixels(of), FramePrediction::Pixels(mixture)) if equations == Equations::Exact => {
+                of_pixels(mixture, &of.0, covariance, &of.1)
             }
             (Self::Classes(causes), FramePrediction::Planes(_) | FramePrediction::Groups(_)) => {
                 each(|cause| [0, 1, 2].map(|class| causes[class][cause as usize]))
@@ -39,7 +42,18 @@ fn each(variance: impl Fn(Cause) -> [f64; 3]) -> Vec<CauseVariance> {
     Cause::ALL.into_iter().map(|cause| CauseVariance { cause, variance: variance(cause) }).collect()
 }
 
-fn of_pixels(mixture: &PixelMoments, causes: &[Budget; 3], covariance: &Matrix3<f64>) -> Vec<CauseVariance> {
+/// Variances of R, G and B that fixed patterns cause.
+pub(super) fn fixed_of(causes: &[Budget; 3]) -> [f64; 3] {
+    let fixed = || Cause::ALL.iter().filter(|cause| cause.is_fixed_pattern());
+    causes.each_ref().map(|budget| fixed().map(|cause| budget[*cause as usize]).sum())
+}
+
+fn of_pixels(
+    mixture: &PixelMoments,
+    causes: &[Budget; 3],
+    covariance: &Matrix3<f64>,
+    fixed: &FixedPart,
+) -> Vec<CauseVariance> {
     let gains = gains::mean_pixel(&mixture.weights);
     let mut found = each(|cause| {
         let of_classes = [0, 1, 2].map(|class| causes[class][cause as usize]);
@@ -56,15 +70,28 @@ fn of_pixels(mixture: &PixelMoments, causes: &[Budget; 3], covariance: &Matrix3<
     let sites = mixture.site_covariance();
     let first_order = gains.of(&sites);
     if !sites.is_independent() {
-        // What is curved in what rows and columns share.
-        let told = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i]).sum::<f64>());
-        let left = [0, 1, 2].map(|i| first_order[(i, i)] - told[i]);
-        let is_left = (0..3).any(|i| left[i].abs() > 1e-9 * first_order[(i, i)]);
-        let clipped = &mut found[Cause::ClippedPattern as usize].variance;
-        clipped.iter_mut().zip(left).filter(|_| is_left).for_each(|(clipped, left)| *clipped += left);
+        // What is curved in what rows and columns share: of what is drawn anew in each exposure, and of what is not.
+        let anew = first_order - fixed.first_order;
+        let parts = [(false, curving(causes), anew), (true, Cause::ClippedPattern, fixed.first_order)];
+        for (is_fixed, cause, part) in parts {
+            let of_part = || found.iter().filter(|entry| entry.cause.is_fixed_pattern() == is_fixed);
+            let left = [0, 1, 2].map(|i| part[(i, i)] - of_part().map(|entry| entry.variance[i]).sum::<f64>());
+            if (0..3).any(|i| left[i].abs() > 1e-9 * first_order[(i, i)]) {
+                let variance = &mut found[cause as usize].variance;
+                variance.iter_mut().zip(left).for_each(|(variance, left)| *variance += left);
+            }
+        }
     }
-    found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| covariance[(i, i)] - first_order[(i, i)]);
+    let of_pattern = fixed.covariance - fixed.first_order;
+    found[Cause::CurvedPattern as usize].variance = of_pattern.diagonal().into();
+    found[Cause::Curvature as usize].variance = (covariance - first_order - of_pattern).diagonal().into();
     found
+}
+
+/// What makes photosites follow what they share on a curve.
+fn curving(causes: &[Budget; 3]) -> Cause {
+    let acts = |cause: &Cause| causes.iter().any(|budget| budget[*cause as usize] != 0.0);
+    [Cause::Rails, Cause::FullWell].into_iter().find(acts).unwrap_or(Cause::Quantization)
 }
 
 /// What is between places of pixels that several amplifiers have a part in is theirs.

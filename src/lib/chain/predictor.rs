@@ -4,7 +4,7 @@
 //! is predicted here is what `measure` compares such frames with.
 
 use super::camera::CameraSetup;
-use super::causes::Causes;
+use super::causes::{Causes, fixed_of};
 use super::predicted::{CauseVariance, ChainPrediction, ChainStage, NoiseDeltaE, PhaseCovariance, StagePrediction};
 use crate::camera::sensor::Sensor;
 use crate::color::Space;
@@ -231,7 +231,14 @@ impl Predictor {
                 }
                 _ => {}
             }
-            stages.push(self.settings.stage(*stage, head, &prediction, &Causes::Classes(Box::new(causes))));
+            let causes_of_stage = match &prediction {
+                FramePrediction::Pixels(mixture) if self.settings.equations == Equations::Exact => {
+                    let fixed = sites.fixed(head, mixture, fixed_of(&causes)).map_err(none)?;
+                    Causes::Pixels(Box::new((causes, fixed)))
+                }
+                _ => Causes::Classes(Box::new(causes)),
+            };
+            stages.push(self.settings.stage(*stage, head, &prediction, &causes_of_stage));
             known = Some((plane, sites, causes));
         }
         Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order, no_pixels })

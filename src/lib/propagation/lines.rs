@@ -117,6 +117,13 @@ fn own(model: &NoiseModel) -> NoiseModel {
     NoiseModel { lines: LineNoise { dsnu_e: model.lines.dsnu_e, ..LineNoise::default() }, ..*model }
 }
 
+/// The model with what rows and columns have anew in each exposure drawn for each photosite apart.
+fn anew_apart(model: &NoiseModel) -> NoiseModel {
+    let lines =
+        LineNoise { row_noise_e: 0.0, column_noise_e: 0.0, black_drift_e: 0.0, black_drift_rows: 0.0, ..model.lines };
+    NoiseModel { read_noise_e: model.read_noise(), lines, ..*model }
+}
+
 impl Photosite {
     /// All models of noise that its samples follow from.
     pub(super) fn models(&self) -> impl Iterator<Item = &NoiseModel> {
@@ -208,6 +215,17 @@ impl Photosite {
             }
         };
         Ok(self.by_class(&row, &column, slopes))
+    }
+
+    /// What of that is the same in every exposure: what the means share that photosites have over exposures, in which all that rows and
+    /// columns have anew is noise like that of their own.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::lines`].
+    pub(super) fn fixed_lines(&self, expected_e: [f64; 3]) -> Predicted<[LineCovariance; 3]> {
+        let darks = self.darks.map(|dark| dark.map(|dark| Dark { model: anew_apart(&dark.model), ..dark }));
+        Self { model: anew_apart(&self.model), darks, ..*self }.lines(expected_e)
     }
 
     /// Whether photosites of these signals follow what they share on a curve.

@@ -166,12 +166,13 @@ impl Photosite {
     ///
     /// [`Unpredictable::Beyond`] where no formula tells what rows and columns share.
     pub(super) fn temporal_of(&self, expected_e: [f64; 3]) -> Predicted<[Temporal; 3]> {
-        let lines = if self.has_lines() {
-            let mut one = Self { darks: [None; MOST_DARKS], flat: None, ..*self };
-            one.model.lines = without_fixed(one.model.lines);
-            one.lines(expected_e)?
-        } else {
-            [LineCovariance::default(); 3]
+        let one = Self { darks: [None; MOST_DARKS], flat: None, ..*self };
+        let lines = match one.has_lines() {
+            true => {
+                let [whole, fixed] = [one.lines(expected_e)?, one.fixed_lines(expected_e)?];
+                [0, 1, 2].map(|k| whole[k].less(&fixed[k]))
+            }
+            false => [LineCovariance::default(); 3],
         };
         let found = [0, 1, 2].map(|k| Temporal { lines: lines[k], ..self.temporal(k, expected_e[k], true) });
         let is_known = self.flat.is_some() || found.iter().all(|temporal| !temporal.variance.is_nan());
