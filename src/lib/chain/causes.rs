@@ -1,10 +1,11 @@
 //! The variance of a stage by cause.
 
 use super::predicted::CauseVariance;
+use crate::metadata::FrameHeader;
 use crate::propagation::budget::{Budget, Cause};
-use crate::propagation::frame::FixedPart;
+use crate::propagation::frame::{FixedPart, Predicted, Sites};
 use crate::propagation::gains;
-use crate::propagation::{Equations, FramePrediction, PixelMoments, TappedPixels};
+use crate::propagation::{Equations, FramePrediction, PixelMoments, Prediction, TappedPixels};
 use nalgebra::Matrix3;
 
 /// Variances of photosites by cause.
@@ -13,11 +14,21 @@ pub(super) enum Causes {
     Classes(Box<[Budget; 3]>),
     /// The same with what of the pixels that are made of them is the same in every exposure.
     Pixels(Box<([Budget; 3], FixedPart)>),
-    /// The same behind each amplifier.
-    Taps(Vec<(usize, [Budget; 3])>),
+    /// The same behind each amplifier, and the means that their photosites have over exposures.
+    Taps(Vec<(usize, [Budget; 3], [Prediction; 3])>),
 }
 
 impl Causes {
+    /// Those of a frame of such photosites, whose variances have these causes.
+    pub fn of(sites: &Sites, head: &FrameHeader, prediction: &FramePrediction, causes: [Budget; 3]) -> Predicted<Self> {
+        Ok(match prediction {
+            FramePrediction::Pixels(mixture) if sites.photosite.equations == Equations::Exact => {
+                Self::Pixels(Box::new((causes, sites.fixed(head, mixture, fixed_of(&causes))?)))
+            }
+            _ => Self::Classes(Box::new(causes)),
+        })
+    }
+
     /// Variances of the channels of a stage by cause; none for mixtures by the paper's equations, which do not keep causes apart.
     pub fn of_stage(
         &self,
@@ -95,17 +106,26 @@ fn curving(causes: &[Budget; 3]) -> Cause {
 }
 
 /// What is between places of pixels that several amplifiers have a part in is theirs.
-fn of_tapped(pixels: &TappedPixels, budgets: &[(usize, [Budget; 3])], covariance: &Matrix3<f64>) -> Vec<CauseVariance> {
-    let of_tap = |tap: usize| budgets.iter().find(|(of, _)| *of == tap).map(|(_, causes)| causes);
+fn of_tapped(
+    pixels: &TappedPixels,
+    budgets: &[(usize, [Budget; 3], [Prediction; 3])],
+    covariance: &Matrix3<f64>,
+) -> Vec<CauseVariance> {
+    let of_tap = |tap: usize| budgets.iter().find(|(of, ..)| *of == tap);
     let mut found = each(|cause| {
-        let of_site = |tap: usize, class: usize| of_tap(tap).map_or(0.0, |causes| causes[class][cause as usize]);
+        let of_site =
+            |tap: usize, class: usize| of_tap(tap).map_or(0.0, |(_, causes, _)| causes[class][cause as usize]);
         pixels.within(of_site).diagonal().into()
     });
     let between = pixels.between();
     let told = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i]).sum::<f64>() + between[(i, i)]);
     found[Cause::Taps as usize].variance = between.diagonal().into();
     if pixels.bias != [0.0; 3] {
-        found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| covariance[(i, i)] - told[i]);
+        let none = Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0);
+        let of_pattern = pixels.curved_pattern(|tap, class| of_tap(tap).map_or(none, |(_, _, means)| means[class]));
+        found[Cause::CurvedPattern as usize].variance = of_pattern.diagonal().into();
+        found[Cause::Curvature as usize].variance =
+            [0, 1, 2].map(|i| covariance[(i, i)] - told[i] - of_pattern[(i, i)]);
     }
     found
 }

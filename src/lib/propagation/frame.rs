@@ -264,7 +264,11 @@ impl Sites {
 
     /// Photosites whose samples are the means that these have over exposures; where it is asked, with cumulants beyond the second, and in
     /// the third cov(v, m), by which the variance v over exposures follows the mean m.
-    fn means_over_exposures(&self, variances: [f64; 3], is_told: bool) -> Predicted<Self> {
+    ///
+    /// # Errors
+    ///
+    /// As [`of_frame`].
+    pub fn means_over_exposures(&self, variances: [f64; 3], is_told: bool) -> Predicted<Self> {
         let lines = self.photosite.fixed_lines(self.expected_e)?;
         let of_class = |k: usize| {
             let unlike = is_told.then(|| self.photosite.temporal(k, self.expected_e[k], true).unlike).flatten();
