@@ -31,6 +31,7 @@ mod mistakes;
 mod noise;
 mod nothing_lost;
 mod over_frames;
+mod parts;
 mod photon_transfer;
 mod photosites;
 mod pictures;

@@ -245,7 +245,8 @@ class Prediction(ProgramCase):
             [(lab(mean + d) - lab(mean - d)) / (2 * d.sum()) for d in np.diag(steps)], axis=1
         )
         first_order = jacobian @ xyz @ jacobian.T
-        curvature = next(cause["variance"] for cause in stages["lab"]["causes"] if cause["cause"] == "curvature")
+        is_curved = lambda cause: cause["cause"] in ("curvature", "curved_pattern")
+        curvature = np.sum([cause["variance"] for cause in stages["lab"]["causes"] if is_curved(cause)], axis=0)
         without = np.diag(stages["lab"]["covariance"]) - curvature
         self.close(without, np.diag(first_order), 1e-6, "Lab to first order")
         # The second order: a cube root adds 4/3 of the square of noise over signal to its variance, less what skewness takes.

@@ -1,20 +1,34 @@
 //! The variance of a stage by cause.
 
 use super::predicted::CauseVariance;
+use crate::metadata::FrameHeader;
 use crate::propagation::budget::{Budget, Cause};
+use crate::propagation::frame::{FixedPart, Predicted, Sites};
 use crate::propagation::gains;
-use crate::propagation::{Equations, FramePrediction, PixelMoments, TappedPixels};
+use crate::propagation::{Equations, FramePrediction, PixelMoments, Prediction, TappedPixels};
 use nalgebra::Matrix3;
 
 /// Variances of photosites by cause.
 pub(super) enum Causes {
     /// Of R, G and B.
     Classes(Box<[Budget; 3]>),
-    /// The same behind each amplifier.
-    Taps(Vec<(usize, [Budget; 3])>),
+    /// The same with what of the pixels that are made of them is the same in every exposure.
+    Pixels(Box<([Budget; 3], FixedPart)>),
+    /// The same behind each amplifier, and the means that their photosites have over exposures.
+    Taps(Vec<(usize, [Budget; 3], [Prediction; 3])>),
 }
 
 impl Causes {
+    /// Those of a frame of such photosites, whose variances have these causes.
+    pub fn of(sites: &Sites, head: &FrameHeader, prediction: &FramePrediction, causes: [Budget; 3]) -> Predicted<Self> {
+        Ok(match prediction {
+            FramePrediction::Pixels(mixture) if sites.photosite.equations == Equations::Exact => {
+                Self::Pixels(Box::new((causes, sites.fixed(head, mixture, fixed_of(&causes))?)))
+            }
+            _ => Self::Classes(Box::new(causes)),
+        })
+    }
+
     /// Variances of the channels of a stage by cause; none for mixtures by the paper's equations, which do not keep causes apart.
     pub fn of_stage(
         &self,
@@ -23,8 +37,8 @@ impl Causes {
         equations: Equations,
     ) -> Vec<CauseVariance> {
         match (self, prediction) {
-            (Self::Classes(causes), FramePrediction::Pixels(mixture)) if equations == Equations::Exact => {
-                of_pixels(mixture, causes, covariance)
+            (Self::Pixels(of), FramePrediction::Pixels(mixture)) if equations == Equations::Exact => {
+                of_pixels(mixture, &of.0, covariance, &of.1)
             }
             (Self::Classes(causes), FramePrediction::Planes(_) | FramePrediction::Groups(_)) => {
                 each(|cause| [0, 1, 2].map(|class| causes[class][cause as usize]))
@@ -39,7 +53,18 @@ fn each(variance: impl Fn(Cause) -> [f64; 3]) -> Vec<CauseVariance> {
     Cause::ALL.into_iter().map(|cause| CauseVariance { cause, variance: variance(cause) }).collect()
 }
 
-fn of_pixels(mixture: &PixelMoments, causes: &[Budget; 3], covariance: &Matrix3<f64>) -> Vec<CauseVariance> {
+/// Variances of R, G and B that fixed patterns cause.
+pub(super) fn fixed_of(causes: &[Budget; 3]) -> [f64; 3] {
+    let fixed = || Cause::ALL.iter().filter(|cause| cause.is_fixed_pattern());
+    causes.each_ref().map(|budget| fixed().map(|cause| budget[*cause as usize]).sum())
+}
+
+fn of_pixels(
+    mixture: &PixelMoments,
+    causes: &[Budget; 3],
+    covariance: &Matrix3<f64>,
+    fixed: &FixedPart,
+) -> Vec<CauseVariance> {
     let gains = gains::mean_pixel(&mixture.weights);
     let mut found = each(|cause| {
         let of_classes = [0, 1, 2].map(|class| causes[class][cause as usize]);
@@ -56,29 +81,51 @@ fn of_pixels(mixture: &PixelMoments, causes: &[Budget; 3], covariance: &Matrix3<
     let sites = mixture.site_covariance();
     let first_order = gains.of(&sites);
     if !sites.is_independent() {
-        // What is curved in what rows and columns share.
-        let told = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i]).sum::<f64>());
-        let left = [0, 1, 2].map(|i| first_order[(i, i)] - told[i]);
-        let is_left = (0..3).any(|i| left[i].abs() > 1e-9 * first_order[(i, i)]);
-        let clipped = &mut found[Cause::ClippedPattern as usize].variance;
-        clipped.iter_mut().zip(left).filter(|_| is_left).for_each(|(clipped, left)| *clipped += left);
+        // What is curved in what rows and columns share: of what is drawn anew in each exposure, and of what is not.
+        let anew = first_order - fixed.first_order;
+        let parts = [(false, curving(causes), anew), (true, Cause::ClippedPattern, fixed.first_order)];
+        for (is_fixed, cause, part) in parts {
+            let of_part = || found.iter().filter(|entry| entry.cause.is_fixed_pattern() == is_fixed);
+            let left = [0, 1, 2].map(|i| part[(i, i)] - of_part().map(|entry| entry.variance[i]).sum::<f64>());
+            if (0..3).any(|i| left[i].abs() > 1e-9 * first_order[(i, i)]) {
+                let variance = &mut found[cause as usize].variance;
+                variance.iter_mut().zip(left).for_each(|(variance, left)| *variance += left);
+            }
+        }
     }
-    found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| covariance[(i, i)] - first_order[(i, i)]);
+    let of_pattern = fixed.covariance - fixed.first_order;
+    found[Cause::CurvedPattern as usize].variance = of_pattern.diagonal().into();
+    found[Cause::Curvature as usize].variance = (covariance - first_order - of_pattern).diagonal().into();
     found
 }
 
+/// What makes photosites follow what they share on a curve.
+fn curving(causes: &[Budget; 3]) -> Cause {
+    let acts = |cause: &Cause| causes.iter().any(|budget| budget[*cause as usize] != 0.0);
+    [Cause::Rails, Cause::FullWell].into_iter().find(acts).unwrap_or(Cause::Quantization)
+}
+
 /// What is between places of pixels that several amplifiers have a part in is theirs.
-fn of_tapped(pixels: &TappedPixels, budgets: &[(usize, [Budget; 3])], covariance: &Matrix3<f64>) -> Vec<CauseVariance> {
-    let of_tap = |tap: usize| budgets.iter().find(|(of, _)| *of == tap).map(|(_, causes)| causes);
+fn of_tapped(
+    pixels: &TappedPixels,
+    budgets: &[(usize, [Budget; 3], [Prediction; 3])],
+    covariance: &Matrix3<f64>,
+) -> Vec<CauseVariance> {
+    let of_tap = |tap: usize| budgets.iter().find(|(of, ..)| *of == tap);
     let mut found = each(|cause| {
-        let of_site = |tap: usize, class: usize| of_tap(tap).map_or(0.0, |causes| causes[class][cause as usize]);
+        let of_site =
+            |tap: usize, class: usize| of_tap(tap).map_or(0.0, |(_, causes, _)| causes[class][cause as usize]);
         pixels.within(of_site).diagonal().into()
     });
     let between = pixels.between();
     let told = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i]).sum::<f64>() + between[(i, i)]);
     found[Cause::Taps as usize].variance = between.diagonal().into();
     if pixels.bias != [0.0; 3] {
-        found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| covariance[(i, i)] - told[i]);
+        let none = Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0);
+        let of_pattern = pixels.curved_pattern(|tap, class| of_tap(tap).map_or(none, |(_, _, means)| means[class]));
+        found[Cause::CurvedPattern as usize].variance = of_pattern.diagonal().into();
+        found[Cause::Curvature as usize].variance =
+            [0, 1, 2].map(|i| covariance[(i, i)] - told[i] - of_pattern[(i, i)]);
     }
     found
 }

@@ -4,7 +4,7 @@
 //! is predicted here is what `measure` compares such frames with.
 
 use super::camera::CameraSetup;
-use super::causes::Causes;
+use super::causes::{Causes, fixed_of};
 use super::predicted::{CauseVariance, ChainPrediction, ChainStage, NoiseDeltaE, PhaseCovariance, StagePrediction};
 use crate::camera::sensor::Sensor;
 use crate::color::Space;
@@ -231,7 +231,8 @@ impl Predictor {
                 }
                 _ => {}
             }
-            stages.push(self.settings.stage(*stage, head, &prediction, &Causes::Classes(Box::new(causes))));
+            let of_stage = Causes::of(&sites, head, &prediction, causes).map_err(none)?;
+            stages.push(self.settings.stage(*stage, head, &prediction, &of_stage));
             known = Some((plane, sites, causes));
         }
         Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order, no_pixels })
@@ -253,19 +254,23 @@ impl PredictorSettings {
     fn of_taps(&self, head: &FrameHeader) -> Predicted<(FramePrediction, Causes)> {
         let prediction = of_frame(head, self.equations)?;
         let mut budgets = Vec::new();
-        for (tap, counts, sites) in Sites::of_taps(head, self.equations)? {
+        let mut counts = Vec::new();
+        for (tap, of_tap, sites) in Sites::of_taps(head, self.equations)? {
             let of_class = |e: f64| sites.photosite.causes(e);
             let [r, g, b] = sites.expected_e;
-            budgets.push((tap, counts, [of_class(r)?, of_class(g)?, of_class(b)?]));
+            let causes = [of_class(r)?, of_class(g)?, of_class(b)?];
+            let is_curved = head.metadata.quantity == QuantityKind::Lab;
+            let means = sites.means_over_exposures(fixed_of(&causes), is_curved)?.moments;
+            budgets.push((tap, causes, means));
+            counts.push(of_tap);
         }
         let FramePrediction::Groups(groups) = &prediction else {
-            let of_taps = budgets.into_iter().map(|(tap, _, budgets)| (tap, budgets));
-            return Ok((prediction, Causes::Taps(of_taps.collect())));
+            return Ok((prediction, Causes::Taps(budgets)));
         };
         let mut causes = [[0.0; Cause::ALL.len()]; 3];
         for (k, causes) in causes.iter_mut().enumerate() {
-            let n: f64 = budgets.iter().map(|(_, counts, _)| counts[k]).sum();
-            for (_, counts, budgets) in &budgets {
+            let n: f64 = counts.iter().map(|counts| counts[k]).sum();
+            for (counts, (_, budgets, _)) in counts.iter().zip(&budgets) {
                 causes.iter_mut().zip(budgets[k]).for_each(|(sum, variance)| *sum += counts[k] * variance / n);
             }
         }

@@ -59,13 +59,15 @@ pub enum Cause {
     Taps,
     /// What full well, rounding and the ends of the range take from the fixed patterns, or add to them.
     ClippedPattern,
-    /// What is curved in a color takes from its variance, or adds to it.
+    /// What is curved in a color takes from its variance, or adds to it: of what is drawn anew in each exposure.
     Curvature,
+    /// The same of what fixed patterns alone make of it, a fixed pattern.
+    CurvedPattern,
 }
 
 impl Cause {
     /// All causes, in the order in which they act.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::SignalShot,
         Self::Prnu,
         Self::PrnuRow,
@@ -88,6 +90,7 @@ impl Cause {
         Self::Taps,
         Self::ClippedPattern,
         Self::Curvature,
+        Self::CurvedPattern,
     ];
 
     /// The name in reports.
@@ -115,6 +118,7 @@ impl Cause {
             Self::Taps => "taps",
             Self::ClippedPattern => "clipped_pattern",
             Self::Curvature => "curvature",
+            Self::CurvedPattern => "curved_pattern",
         }
     }
 
@@ -122,7 +126,7 @@ impl Cause {
     pub fn is_fixed_pattern(self) -> bool {
         PATTERNS.contains(&self)
             || OFFSETS.contains(&self)
-            || matches!(self, Self::HotPixels | Self::Taps | Self::ClippedPattern)
+            || matches!(self, Self::HotPixels | Self::Taps | Self::ClippedPattern | Self::CurvedPattern)
     }
 
     /// Whether photosites of a row (0), or of a column (1), share it; none where each has its own.

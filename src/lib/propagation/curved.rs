@@ -90,30 +90,21 @@ pub(super) fn moments(
     // The same as if all were normal.
     let (mut normal, mut normal_square) = (Vector3::zeros(), Matrix3::zeros());
     for law in laws {
-        let axes = law.covariance.symmetric_eigen();
-        let largest = axes.eigenvalues.max().max(0.0);
-        let lengths = axes.eigenvalues.map(|value| if value > 1e-14 * largest { value.sqrt() } else { 0.0 });
-        let along = axes.eigenvectors * Matrix3::from_diagonal(&lengths);
-        let inverse = lengths.map(|length| if length > 0.0 { 1.0 / length } else { 0.0 });
-        let shape = Shape::along(law, &(Matrix3::from_diagonal(&inverse) * axes.eigenvectors.transpose()));
+        let [along, back] = principal(&law.covariance);
+        let shape = Shape::along(law, &back);
         let shape = match shape.is_told() {
             true => shape,
             false if shape.matters(largest_share(mean, &law.covariance)) => return None,
             false => Shape::default(),
         };
-        for (x, of_x) in NODES {
-            for (y, of_y) in NODES {
-                for (z, of_z) in NODES {
-                    let of_normal = of_x * of_y * of_z;
-                    let weight = of_normal * (1.0 + shape.at([x, y, z]));
-                    let channels = Vector3::from(mean) + along * Vector3::new(x, y, z);
-                    let offset = Vector3::from(value(channels.into())) - reference;
-                    first += weight * offset;
-                    second += weight * offset * offset.transpose();
-                    normal += of_normal * offset;
-                    normal_square += of_normal * offset * offset.transpose();
-                }
-            }
+        for (of_normal, z) in grid() {
+            let weight = of_normal * (1.0 + shape.at(z));
+            let channels = Vector3::from(mean) + along * Vector3::from(z);
+            let offset = Vector3::from(value(channels.into())) - reference;
+            first += weight * offset;
+            second += weight * offset * offset.transpose();
+            normal += of_normal * offset;
+            normal_square += of_normal * offset * offset.transpose();
         }
     }
     let count = laws.len() as f64;
@@ -123,6 +114,60 @@ pub(super) fn moments(
     let of_normal = normal_square - normal * normal.transpose();
     let is_told = |i: usize| (covariance[(i, i)] - of_normal[(i, i)]).abs() <= MOST_MOVED * of_normal[(i, i)];
     (0..3).all(is_told).then(|| ((reference + first).into(), covariance))
+}
+
+/// Covariance, over pixels of several laws, of the means that `value` has over exposures: channels = `mean` + f + t, f the fixed pattern,
+/// of these laws, and t what is drawn anew, of such covariances.
+///
+/// E \[value | f] is a mean over ± √3 σ along the principal axes of t: exact for a cubic. So of a parabola with the second derivatives H
+/// the pattern has J Σ_f Jᵀ + ½ tr(H Σ_f H Σ_f), and what is drawn anew the rest, ½ tr(H Σ_t H Σ_t) + tr(H Σ_f H Σ_t) and J Σ_t Jᵀ.
+/// Where the variance of t differs with f, cov(f, ½ tr H Σ_t) counts twice, as the third cumulant of f does, in which it is to be.
+pub(super) fn fixed(
+    mean: [f64; 3],
+    parts: &[(PixelLaw, Matrix3<f64>)],
+    value: impl Fn([f64; 3]) -> [f64; 3],
+) -> Matrix3<f64> {
+    let reference = Vector3::from(value(mean));
+    let (mut first, mut second) = (Vector3::zeros(), Matrix3::zeros());
+    for (law, anew) in parts {
+        let [along, back] = principal(&law.covariance);
+        let shape = Shape::along(law, &back);
+        let [axes, _] = principal(anew);
+        let blurred = |channels: Vector3<f64>| {
+            let beside = |axis: usize| {
+                let off = 3.0_f64.sqrt() * axes.column(axis);
+                Vector3::from(value((channels + off).into())) + Vector3::from(value((channels - off).into()))
+            };
+            (beside(0) + beside(1) + beside(2)) / 6.0
+        };
+        for (of_normal, z) in grid() {
+            let weight = of_normal * (1.0 + shape.at(z));
+            let offset = blurred(Vector3::from(mean) + along * Vector3::from(z)) - reference;
+            first += weight * offset;
+            second += weight * offset * offset.transpose();
+        }
+    }
+    let count = parts.len() as f64;
+    second / count - first * first.transpose() / (count * count)
+}
+
+/// Standard normal numbers along three axes, with their weights.
+fn grid() -> impl Iterator<Item = (f64, [f64; 3])> {
+    let plane = |(x, of_x): (f64, f64)| {
+        let line = move |(y, of_y): (f64, f64)| NODES.map(|(z, of_z)| (of_x * of_y * of_z, [x, y, z]));
+        NODES.into_iter().flat_map(line)
+    };
+    NODES.into_iter().flat_map(plane)
+}
+
+/// Standard deviations along the principal axes of a covariance, as columns, and the way back to numbers of unit variance.
+fn principal(covariance: &Matrix3<f64>) -> [Matrix3<f64>; 2] {
+    let axes = covariance.symmetric_eigen();
+    let largest = axes.eigenvalues.max().max(0.0);
+    let lengths = axes.eigenvalues.map(|value| if value > 1e-14 * largest { value.sqrt() } else { 0.0 });
+    let inverse = lengths.map(|length| if length > 0.0 { 1.0 / length } else { 0.0 });
+    let along = axes.eigenvectors * Matrix3::from_diagonal(&lengths);
+    [along, Matrix3::from_diagonal(&inverse) * axes.eigenvectors.transpose()]
 }
 
 /// The largest share of a channel that its noise is.

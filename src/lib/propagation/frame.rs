@@ -4,10 +4,11 @@
 //! pixels ([`PixelMoments`]).
 
 use super::curved;
+use super::gains;
 use super::ground::{Ground, quantity_of_sites, subtracted};
 use super::lines::DRIFTING;
 use super::moments::LineCovariance;
-use super::moments::{Equations, Prediction};
+use super::moments::{Equations, Prediction, SiteCovariance};
 use super::photosite::Photosite;
 use super::pixel_moments::PixelMoments;
 use super::repeated;
@@ -103,6 +104,15 @@ pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePre
     Ok(prediction)
 }
 
+/// What of the covariance of the channels of a pixel is the same in every exposure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixedPart {
+    /// To first order.
+    pub first_order: Matrix3<f64>,
+    /// With what is curved in a color, where that is told.
+    pub covariance: Matrix3<f64>,
+}
+
 /// The photosites of R, G and B that a frame was made of, in the unit that it was made in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sites {
@@ -180,7 +190,21 @@ impl Sites {
     /// As [`of_frame`].
     pub fn frame(&self, frame: &FrameHeader) -> Predicted<FramePrediction> {
         let metadata = &frame.metadata;
-        let Some(record) = &metadata.demosaic else { return Ok(FramePrediction::Planes(self.moments)) };
+        if metadata.demosaic.is_none() {
+            return Ok(FramePrediction::Planes(self.moments));
+        }
+        let straight = self.straight(frame)?;
+        let pixels = match Curved::of(metadata)? {
+            Some(space) => straight.to_color(space, self.photosite.equations)?,
+            None => straight,
+        };
+        Ok(FramePrediction::Pixels(Box::new(pixels)))
+    }
+
+    /// Pixels of a demosaicked frame; of a space that is curved in XYZ these.
+    fn straight(&self, frame: &FrameHeader) -> Predicted<PixelMoments> {
+        let metadata = &frame.metadata;
+        let record = metadata.demosaic.as_ref().ok_or(Unpredictable::Missing("demosaic"))?;
         if self.photosite.drifts() {
             return Err(Unpredictable::Beyond(DRIFTING));
         }
@@ -195,12 +219,12 @@ impl Sites {
         if has_tails && method == Method::SmoothHue {
             camera.void = Some(tails::CURVED);
         }
-        let is_curved = is_curved(metadata.quantity) && has_tails;
+        let is_void = is_curved(metadata.quantity) && has_tails;
         let Some(record) = &metadata.color else {
             if metadata.quantity != quantity_of_sites(frame) {
                 return Err(Unpredictable::Missing("color"));
             }
-            return Ok(FramePrediction::Pixels(Box::new(camera)));
+            return Ok(camera);
         };
         let xyz_from_adu = record.xyz_from_adu(metadata.exposure).ok_or(Unpredictable::Missing("exposure"))?;
         let xyz = match equations {
@@ -212,14 +236,49 @@ impl Sites {
             }
             _ => camera.through(&xyz_from_adu, record.black_adu),
         };
-        let xyz = if is_curved { PixelMoments { void: xyz.void.or(Some(tails::CURVED)), ..xyz } } else { xyz };
-        let pixels = match (Curved::of(metadata)?, metadata.quantity) {
-            (Some(space), _) => xyz.to_color(space, equations)?,
-            (None, QuantityKind::Xyz) => xyz,
-            (None, QuantityKind::LinearSrgb) => xyz.through(&color::linear_srgb_from_xyz(white(metadata)?), 0.0),
-            _ => return Err(Unpredictable::Beyond(OTHER_COLORS)),
+        let xyz = if is_void { PixelMoments { void: xyz.void.or(Some(tails::CURVED)), ..xyz } } else { xyz };
+        match metadata.quantity {
+            QuantityKind::LinearSrgb => Ok(xyz.through(&color::linear_srgb_from_xyz(white(metadata)?), 0.0)),
+            QuantityKind::Xyz => Ok(xyz),
+            curved if is_curved(curved) => Ok(xyz),
+            _ => Err(Unpredictable::Beyond(OTHER_COLORS)),
+        }
+    }
+
+    /// What of the covariance of pixels that were made of these photosites is the same in every exposure, by the variances of the means
+    /// that photosites of each class have over exposures.
+    ///
+    /// # Errors
+    ///
+    /// As [`of_frame`].
+    pub fn fixed(&self, frame: &FrameHeader, pixels: &PixelMoments, variances: [f64; 3]) -> Predicted<FixedPart> {
+        let space = Curved::of(&frame.metadata)?.filter(|_| pixels.void.is_none());
+        let means = self.means_over_exposures(variances, space.is_some())?;
+        let first_order = gains::mean_pixel(&pixels.weights).of(&SiteCovariance::of(&means.moments));
+        let covariance = match space {
+            Some(space) => self.straight(frame)?.fixed_in(&means.straight(frame)?, |xyz| space.value(xyz)),
+            None => first_order,
         };
-        Ok(FramePrediction::Pixels(Box::new(pixels)))
+        Ok(FixedPart { first_order, covariance })
+    }
+
+    /// Photosites whose samples are the means that these have over exposures; where it is asked, with cumulants beyond the second, and in
+    /// the third cov(v, m), by which the variance v over exposures follows the mean m.
+    ///
+    /// # Errors
+    ///
+    /// As [`of_frame`].
+    pub fn means_over_exposures(&self, variances: [f64; 3], is_told: bool) -> Predicted<Self> {
+        let lines = self.photosite.fixed_lines(self.expected_e)?;
+        let of_class = |k: usize| {
+            let unlike = is_told.then(|| self.photosite.temporal(k, self.expected_e[k], true).unlike).flatten();
+            let unlike = unlike.unwrap_or_default();
+            let [third, fourth] = unlike.of_means.unwrap_or_default();
+            let third = third + unlike.with_mean[0];
+            let mean = self.moments[k].moments.mean;
+            Prediction { lines: lines[k], ..Prediction::of_cumulants(mean, variances[k], third, fourth) }
+        };
+        Ok(Self { moments: [0, 1, 2].map(of_class), ..self.clone() })
     }
 }
 

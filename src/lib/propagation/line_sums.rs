@@ -5,10 +5,11 @@
 //! less the charge, or each count of it, and the sum over v has panels between them. Of u it is smooth even then, as far as shot
 //! noise, or what is added, blurs it.
 
+use super::blur::blur_e;
 use super::covariance::PAIRS;
 use super::effort;
 use super::law::Law;
-use super::lines::{Axis, MOST_NODES, TOO_COARSE, blur_e, nodes};
+use super::lines::{Axis, MOST_NODES, TOO_COARSE, nodes};
 use super::moments::LineCovariance;
 use super::photosite::Photosite;
 use super::reading::{Reading, codes_of};
@@ -23,6 +24,10 @@ const MOST_STEPPED: usize = 6000;
 
 /// Evaluations that a sum may take, a tenth of a second.
 const MOST_WORK: u64 = 16_000_000;
+
+/// Why nothing is said where a sum takes more.
+const TAKES_LONG: &str = "full well, an end of the codes or their rounding bends what rows or columns share, and all counts of light and \
+                          dark signal beside each of its values take too many evaluations";
 
 /// Standard deviations beyond which what is shared does not count.
 const REACH: f64 = 6.5;
@@ -58,7 +63,7 @@ impl Photosite {
     /// [`Unpredictable::Beyond`] where they are too many.
     pub(super) fn curved(&self, axes: &[Axis], expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
         let found = effort::within(MOST_WORK, || self.curved_within(axes, expected_e));
-        found.unwrap_or(Err(Unpredictable::Beyond(TOO_COARSE)))
+        found.unwrap_or(Err(Unpredictable::Beyond(TAKES_LONG)))
     }
 
     fn curved_within(&self, axes: &[Axis], expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
@@ -102,7 +107,7 @@ impl Photosite {
             for (v, of_v) in offsets {
                 foreseen.begin_next();
                 if effort::is_spent() {
-                    return Err(Unpredictable::Beyond(TOO_COARSE));
+                    return Err(Unpredictable::Beyond(TAKES_LONG));
                 }
                 let means = self.means(&shared, &gained, offset_e * v);
                 for (sum, mean) in first.iter_mut().zip(means) {

@@ -23,9 +23,9 @@
 //! The covariance matrix of all photosites of a frame is then block plus low rank: D + Σ_rows Z R Zᵀ + Σ_columns Z S Zᵀ, Z
 //! telling the classes, D diagonal with the variance of each less R_kk + S_kk.
 
+use super::blur::is_blurred;
 use super::charge::charge;
 use super::curved::NODES;
-
 use super::law::Law;
 use super::masters::Dark;
 use super::moments::{Equations, LineCovariance};
@@ -115,6 +115,13 @@ impl Axis {
 /// What is a photosite's own of the noise.
 fn own(model: &NoiseModel) -> NoiseModel {
     NoiseModel { lines: LineNoise { dsnu_e: model.lines.dsnu_e, ..LineNoise::default() }, ..*model }
+}
+
+/// The model with what rows and columns have anew in each exposure drawn for each photosite apart.
+fn anew_apart(model: &NoiseModel) -> NoiseModel {
+    let lines =
+        LineNoise { row_noise_e: 0.0, column_noise_e: 0.0, black_drift_e: 0.0, black_drift_rows: 0.0, ..model.lines };
+    NoiseModel { read_noise_e: model.read_noise(), lines, ..*model }
 }
 
 impl Photosite {
@@ -210,6 +217,17 @@ impl Photosite {
         Ok(self.by_class(&row, &column, slopes))
     }
 
+    /// What of that is the same in every exposure: what the means share that photosites have over exposures, in which all that rows and
+    /// columns have anew is noise like that of their own.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::lines`].
+    pub(super) fn fixed_lines(&self, expected_e: [f64; 3]) -> Predicted<[LineCovariance; 3]> {
+        let darks = self.darks.map(|dark| dark.map(|dark| Dark { model: anew_apart(&dark.model), ..dark }));
+        Self { model: anew_apart(&self.model), darks, ..*self }.lines(expected_e)
+    }
+
     /// Whether photosites of these signals follow what they share on a curve.
     pub(super) fn is_curved_in_lines(&self, expected_e: [f64; 3]) -> Predicted<bool> {
         Ok(!self.has_tails() && self.regime(expected_e)? == Regime::Curved)
@@ -295,28 +313,31 @@ impl Photosite {
         let is_corrected = self.darks[0].is_some() || self.flat.is_some();
         let own = own(&self.model);
         let laws = expected_e.map(|expected_e| Law::of(&self.model, expected_e));
-        let is_cut =
-            laws.iter().zip(expected_e).any(|(law, expected_e)| law.is_rectified() || self.nears_full_well(expected_e));
-        let blur = |adc: &AdcRecord| {
-            let of_class = |expected_e: f64| adc.adu_per_e * blur_e(&own, adc, expected_e);
-            expected_e.into_iter().map(of_class).fold(f64::INFINITY, f64::min)
+        // Full well and sensitivities of zero cut off the charge, and what is added comes to it thereafter: they bend gains alone.
+        let has_gains = self.model.lines.has_gains();
+        let is_full = expected_e.iter().any(|expected_e| self.nears_full_well(*expected_e));
+        let is_cut = has_gains && (is_full || laws.iter().any(|law| law.light.is_rectified(law.full_well_e)));
+        let is_blurred = |adc: &AdcRecord, least: f64| {
+            expected_e.iter().zip(&laws).all(|(expected_e, law)| is_blurred(&own, law, adc, *expected_e, least))
         };
         let is_within = |adc: &AdcRecord| !adc.is_bent() && laws.iter().all(|law| law.is_within(adc));
+        // Of full photosites nothing blurs codes but what is added.
+        let is_cut_in_codes = is_cut || is_full;
         let found = match &self.adc {
             None => Some(if is_cut { Regime::Curved } else { Regime::Straight }),
-            Some(adc) if !is_cut && is_within(adc) && blur(adc) >= BLURRED => Some(Regime::Straight),
+            Some(adc) if !is_cut_in_codes && is_within(adc) && is_blurred(adc, BLURRED) => Some(Regime::Straight),
             Some(_) if !is_corrected => Some(Regime::Curved),
-            Some(adc) => (blur(adc) >= BLURRED_ON_AVERAGE).then_some(Regime::OnAverage),
+            Some(adc) => is_blurred(adc, BLURRED_ON_AVERAGE).then_some(Regime::OnAverage),
         };
         match found {
             None if !self.has_tails() => Err(Unpredictable::Beyond(TOO_COARSE)),
             Some(Regime::Curved) if self.drifts() && !self.has_tails() => {
-                let is_reached = |adc: &AdcRecord| is_cut || laws.iter().any(|law| !law.is_within(adc));
+                let is_reached = |adc: &AdcRecord| is_cut_in_codes || laws.iter().any(|law| !law.is_within(adc));
                 let is_bent = self.adc.as_ref().is_some_and(|adc| adc.is_bent() && !is_reached(adc));
                 Err(Unpredictable::Beyond(if is_bent { DRIFT_BENT } else { DRIFT_CUT }))
             }
             Some(regime) if regime == Regime::Straight || !self.has_tails() => Ok(regime),
-            Some(Regime::Curved) if !is_cut && self.adc.as_ref().is_some_and(is_within) => {
+            Some(Regime::Curved) if !is_cut_in_codes && self.adc.as_ref().is_some_and(is_within) => {
                 Err(Unpredictable::Beyond(COARSE_LINES))
             }
             _ => Err(Unpredictable::Beyond(WITH_LINES)),
@@ -416,21 +437,6 @@ const WITH_LINES: &str = "full well or an end of the codes cuts off what rows or
 /// Why nothing is said of it where codes show.
 const COARSE_LINES: &str = "it shows how codes are rounded, which hot pixels or random telegraph signals beside noise of rows or columns \
                             hide from no formula here; give the sensor read noise";
-
-/// What of a photosite's own spread blurs codes, e⁻: shot noise counts as far as whole electrons are no whole codes.
-pub(super) fn blur_e(model: &NoiseModel, adc: &AdcRecord, expected_e: f64) -> f64 {
-    /// ADU per electron up to which codes take several electrons.
-    const FEW: f64 = 0.2;
-    let law = Law::of(model, expected_e);
-    let turn = std::f64::consts::TAU;
-    let counts = if model.signal_shot { expected_e } else { 0.0 } + if model.dark_shot { model.dark_e } else { 0.0 };
-    let own = law.read_noise_e.hypot(law.least_pattern_std());
-    if adc.adu_per_e > FEW {
-        return own.max(law.blur_by_turns_e(adc));
-    }
-    let shot = 2.0 * counts * (1.0 - (turn * adc.adu_per_e).cos()) / (turn * adc.adu_per_e).powi(2);
-    own.hypot(shot.sqrt())
-}
 
 /// Standard normal numbers and their weights for a function that is smooth on the scale of `blur` of what they are times
 /// `spread`.

@@ -6,6 +6,7 @@
 
 mod amplitudes;
 mod bent;
+mod blur;
 pub mod budget;
 mod charge;
 mod columns;

@@ -111,6 +111,21 @@ pub struct LineCovariance {
     pub together: [f64; 3],
 }
 
+impl LineCovariance {
+    /// What is left where a part of it is taken off.
+    #[must_use]
+    pub fn less(&self, part: &Self) -> Self {
+        let less = |whole: [f64; 3], part: [f64; 3]| [0, 1, 2].map(|l| whole[l] - part[l]);
+        Self {
+            row: less(self.row, part.row),
+            column: less(self.column, part.column),
+            drift: less(self.drift, part.drift),
+            drift_rows: self.drift_rows,
+            together: less(self.together, part.together),
+        }
+    }
+}
+
 /// The covariance of photosites: what each has by itself, and what those of a row and of a column share, by classes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SiteCovariance {

@@ -112,6 +112,17 @@ impl PixelMoments {
         Some(Self { mean, bias: [0, 1, 2].map(|i| mean[i] - local.value[i]), covariance, ..straight })
     }
 
+    /// What of the covariance in a space that is curved in these channels, `value` the color of any, is the same in every exposure: `means`
+    /// are pixels of the means that photosites have over exposures.
+    pub(super) fn fixed_in(&self, means: &Self, value: impl Fn([f64; 3]) -> [f64; 3]) -> Matrix3<f64> {
+        let [whole, fixed] = [self, means].map(Self::phase_covariances);
+        let part = |phase: usize| {
+            let law = PixelLaw { covariance: fixed[phase], ..means.law(phase) };
+            (law, whole[phase] - fixed[phase])
+        };
+        curved::fixed(self.mean, &std::array::from_fn::<_, { PHASES.len() }, _>(part), value)
+    }
+
     /// The same to first order, with the bias of second order.
     #[must_use]
     pub(super) fn linearized(&self, local: &color::Local) -> Self {

@@ -8,10 +8,11 @@
 //! the cumulants of their mean, and the law of their median, which where noise is below a code hangs on where in a code all
 //! photosites of a uniform scene lie. Sums over x, u and o are those over photosites.
 
+use super::blur::blur_e;
 use super::charge::{charge_at, sensitivities};
 use super::counts::Charge;
 use super::law::Law;
-use super::lines::{blur_e, nodes};
+use super::lines::nodes;
 use super::masters::{Dark, kept};
 use super::memory::Memory;
 use super::moments::Prediction;

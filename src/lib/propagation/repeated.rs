@@ -16,6 +16,8 @@
 //! measured variances scatter, are sums over photosites and their counts ([`population`](super::population)); so are medians of
 //! codes that scatter over less than a code, or are far from normal.
 
+use super::counts::Charge;
+use super::law::Law;
 use super::masters::{Dark, MOST_DARKS, kept};
 use super::moments::{Equations, LineCovariance, Prediction};
 use super::photosite::Photosite;
@@ -24,8 +26,9 @@ use super::unpredictable::{Predicted, TOO_LONG, Unpredictable};
 use crate::metadata::{AdcRecord, AverageRecord, ExposuresRecord, FrameHeader};
 use crate::names::Named;
 use crate::numerics::averages::{CLIP, Combine, Kept};
+use crate::numerics::normal::cumulative;
 use crate::stages::demosaic::Method;
-use crate::stages::noise::LineNoise;
+use crate::stages::noise::{LineNoise, NoiseModel};
 use crate::units::QuantityKind;
 
 /// Why nothing is said of averages that are no means where photosites share noise.
@@ -146,10 +149,29 @@ impl Photosite {
         }
     }
 
+    /// Whether the means of photosites over exposures show how codes are rounded: of most, or of so many that have no sensitivity to light,
+    /// or to dark current, and less noise with it, that the variance of all shows what half a code does to theirs.
+    ///
+    /// p d > 10⁻³ v        p their share, d how far they lie from the mean in codes, v what is drawn anew at most, in squared codes
+    fn shows_codes(&self, adc: &AdcRecord, expected_e: f64) -> bool {
+        const SHOWS: f64 = 1e-3;
+        let std_codes = |model: NoiseModel, expected_e: f64| Dark::mean_of(model, 1).std_codes(adc, expected_e);
+        let most = std_codes(self.model, expected_e);
+        let law = Law::of(&self.model, expected_e);
+        let are_apart = |charge: &Charge, (model, expected_e): (NoiseModel, f64)| {
+            charge.is_rectified(law.full_well_e)
+                && cumulative(-1.0 / charge.pattern) * adc.adu_per_e * charge.rate > SHOWS * most * most
+                && std_codes(model, expected_e) < VISIBLE
+        };
+        most < VISIBLE
+            || are_apart(&law.light, (self.model, 0.0))
+            || are_apart(&law.dark, (NoiseModel { dark_e: 0.0, ..self.model }, expected_e))
+    }
+
     /// E v of samples that nothing came off.
     pub(super) fn temporal_variance(&self, expected_e: f64, whole: f64) -> f64 {
-        let shows_codes = |adc: &AdcRecord| Dark::mean_of(self.model, 1).std_codes(adc, expected_e) < VISIBLE;
-        let anew = match self.adc.filter(|adc| self.equations == Equations::Exact && shows_codes(adc)) {
+        let anew = match self.adc.filter(|adc| self.equations == Equations::Exact && self.shows_codes(adc, expected_e))
+        {
             Some(_) if self.has_tails() => self.mixed_temporal(expected_e),
             Some(adc) => whole - self.shared(&adc, (expected_e, None), (self, None), true).light,
             None => whole - self.fixed_variance(expected_e),
@@ -166,12 +188,13 @@ impl Photosite {
     ///
     /// [`Unpredictable::Beyond`] where no formula tells what rows and columns share.
     pub(super) fn temporal_of(&self, expected_e: [f64; 3]) -> Predicted<[Temporal; 3]> {
-        let lines = if self.has_lines() {
-            let mut one = Self { darks: [None; MOST_DARKS], flat: None, ..*self };
-            one.model.lines = without_fixed(one.model.lines);
-            one.lines(expected_e)?
-        } else {
-            [LineCovariance::default(); 3]
+        let one = Self { darks: [None; MOST_DARKS], flat: None, ..*self };
+        let lines = match one.has_lines() {
+            true => {
+                let [whole, fixed] = [one.lines(expected_e)?, one.fixed_lines(expected_e)?];
+                [0, 1, 2].map(|k| whole[k].less(&fixed[k]))
+            }
+            false => [LineCovariance::default(); 3],
         };
         let found = [0, 1, 2].map(|k| Temporal { lines: lines[k], ..self.temporal(k, expected_e[k], true) });
         let is_known = self.flat.is_some() || found.iter().all(|temporal| !temporal.variance.is_nan());

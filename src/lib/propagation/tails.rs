@@ -11,11 +11,11 @@
 //! shows how codes are rounded as far as e^(−40); else panels that narrow towards full well and the ends of the codes.
 
 use super::amplitudes::{Knee, REACH, Ripples, Rounded, nodes, telling};
+use super::blur::blur_e;
 use super::budget::{Budget, Cause};
 use super::charge::charge;
 use super::effort;
 use super::law::Law;
-use super::lines::blur_e;
 use super::masters::Dark;
 use super::memory::Memory;
 use super::moments::{Equations, Prediction};

@@ -9,7 +9,7 @@ use super::curved::{self, PixelLaw};
 use super::gains;
 use super::moments::Prediction;
 use super::sampling::Sampling;
-use super::spaces::Channels;
+use super::spaces::{Channels, Curved};
 use super::taps::Group;
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::taps::Taps;
@@ -41,6 +41,7 @@ pub struct TappedPixels {
     pub groups: Vec<Group>,
     /// Derivatives of the channels with respect to demosaicked R, G and B, on average.
     from_camera: Matrix3<f64>,
+    space: Option<Curved>,
     pub(super) array: Array,
     /// By rows of kinds.
     pub(super) kinds: Vec<Kind>,
@@ -88,6 +89,8 @@ pub(super) struct Kind {
     /// Weights of the three channels by offset.
     table: Vec<[f64; 3]>,
     from_camera: Matrix3<f64>,
+    /// Where the channels are curved, those that they are curved in: their mean, and the derivatives of the channels by them.
+    curved_in: Option<([f64; 3], Matrix3<f64>)>,
 }
 
 /// A photosite of a pixel.
@@ -251,11 +254,13 @@ impl Kind {
         };
         let mut covariance = first_order(&sites);
         let (mut bias, mut beyond, mut from_camera) = ([0.0; 3], Matrix3::zeros(), channels.matrix);
+        let mut curved_in = None;
         if let Some(space) = channels.space {
             if !space.is_quiet(mean, &covariance) {
                 return Err(Unpredictable::Beyond(curved::VOID));
             }
             let local = space.about(mean)?;
+            curved_in = Some((mean, local.jacobian));
             let law = PixelLaw::of(sites.iter().map(|site| (site.weights, &array.sites[site.tap][site.class])));
             let found = curved::moments(mean, &[law], |xyz| space.value(xyz));
             (mean, covariance) = found.ok_or(Unpredictable::Beyond(curved::FAR_FROM_NORMAL))?;
@@ -268,7 +273,22 @@ impl Kind {
         for site in &sites {
             table[index(site.offset)] = site.weights;
         }
-        Ok(Self { share, mean, bias, covariance, beyond, sites, table, from_camera })
+        Ok(Self { share, mean, bias, covariance, beyond, sites, table, from_camera, curved_in })
+    }
+
+    /// What is the same in every exposure of what is curved beyond the weights, `fixed` the law of the means that photosites of an
+    /// amplifier and class have over exposures.
+    fn curved_pattern(&self, fixed: impl Fn(usize, usize) -> Prediction, space: Curved) -> Matrix3<f64> {
+        let found = self.curved_in.and_then(|(mean, jacobian)| Some((mean, jacobian, jacobian.try_inverse()?)));
+        let Some((mean, jacobian, back)) = found else { return Matrix3::zeros() };
+        let before = |site: &Site| -> [f64; 3] { (back * Vector3::from(site.weights)).into() };
+        let of_sites: Vec<_> =
+            self.sites.iter().map(|site| (before(site), site.variance, fixed(site.tap, site.class))).collect();
+        let law = PixelLaw::of(of_sites.iter().map(|(weights, _, prediction)| (*weights, prediction)));
+        let whole: Matrix3<f64> =
+            of_sites.iter().map(|(weights, variance, _)| *variance * product(weights, weights)).sum();
+        let first_order = jacobian * law.covariance * jacobian.transpose();
+        curved::fixed(mean, &[(law, whole - law.covariance)], |channels| space.value(channels)) - first_order
     }
 
     /// What the photosite `offset` away gives to the channels.
@@ -324,7 +344,8 @@ impl TappedPixels {
         let covariance = kinds.iter().map(of_kind).sum();
         let from_camera = kinds.iter().map(|kind| kind.share * kind.from_camera).sum();
         let groups = groups.iter().map(|(_, group)| *group).collect();
-        Ok(Self { mean, bias, covariance, groups, from_camera, array, kinds, sampling: OnceLock::new() })
+        let (space, sampling) = (channels.space, OnceLock::new());
+        Ok(Self { mean, bias, covariance, groups, from_camera, space, array, kinds, sampling })
     }
 
     /// The kind of the pixel in a column and row of the plane.
@@ -346,6 +367,13 @@ impl TappedPixels {
             kind.share * product(&off, &off)
         };
         self.kinds.iter().map(of_kind).sum()
+    }
+
+    /// What is the same in every exposure of what is curved beyond the weights, within kinds of places; `fixed` is the law of the means
+    /// that photosites of an amplifier and class have over exposures.
+    pub fn curved_pattern(&self, fixed: impl Fn(usize, usize) -> Prediction) -> Matrix3<f64> {
+        let Some(space) = self.space else { return Matrix3::zeros() };
+        self.kinds.iter().map(|kind| kind.share * kind.curved_pattern(&fixed, space)).sum()
     }
 
     /// Distance of a pixel from what the mean is without noise.
