@@ -51,4 +51,5 @@ mod support;
 mod tails;
 mod telescopes;
 mod told;
+mod unlike;
 mod viewable;
