@@ -52,4 +52,5 @@ mod support;
 mod tails;
 mod telescopes;
 mod told;
+mod unlike;
 mod viewable;

@@ -122,6 +122,9 @@ pub struct ExposuresRecord {
     /// Whether each was demosaicked before.
     #[serde(default, skip_serializing_if = "is_false")]
     pub demosaicked: bool,
+    /// What levels differ by, in standard deviations of a sample, where a median or clipped mean is no longer that of samples alike.
+    #[serde(default, skip_serializing_if = "is_none_apart")]
+    pub unlike_levels: f64,
 }
 
 impl ExposuresRecord {
@@ -131,7 +134,7 @@ impl ExposuresRecord {
         quantity: QuantityKind,
         demosaicked: bool,
     ) -> Self {
-        Self { frames, combine, clip, quantity, demosaicked }
+        Self { frames, combine, clip, quantity, demosaicked, unlike_levels: 0.0 }
     }
 
     /// How they were averaged.
@@ -272,6 +275,12 @@ impl MasterNoise {
 pub struct FlatRecord {
     /// How its frames were averaged.
     pub average: AverageRecord,
+    /// The light of each frame in shares of the mean, where all were brought to one level before their median or clipped mean.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<f64>,
+    /// What levels differ by from place to place, in standard deviations of a sample, where averages are no longer those of samples alike.
+    #[serde(default, skip_serializing_if = "is_none_apart")]
+    pub unlike_levels: f64,
     /// Means of its classes above what no light reads, in ADU, by which it was divided: of R, G and B, of the filters of
     /// another array in the order of their letters, of the one class there is, or of planes.
     pub means_adu: Vec<f64>,
@@ -320,6 +329,11 @@ pub struct DefectsRecord {
     /// What they were found in.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub found_in: Vec<String>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
+fn is_none_apart(spread: &f64) -> bool {
+    *spread == 0.0
 }
 
 fn is_none_left(counts: &[u64]) -> bool {

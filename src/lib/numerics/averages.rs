@@ -168,7 +168,7 @@ pub fn is_clipped_by_code(count: u32, clip: f64, std_codes: f64) -> bool {
 }
 
 /// Fills `samples` with normal numbers, each trial with its own.
-fn draw(trial: u32, samples: &mut [f32]) {
+pub(super) fn draw(trial: u32, samples: &mut [f32]) {
     let mut words = RunWords::default();
     let mut column = 0_i32;
     for chunk in samples.chunks_mut(128) {
@@ -234,7 +234,7 @@ fn middle(sorted: &[f32]) -> f64 {
 }
 
 /// Sorts samples; the mean of those that clipping leaves, and which these are.
-fn clipped(samples: &mut [f32], clip: f64) -> (f64, std::ops::Range<usize>) {
+pub(super) fn clipped(samples: &mut [f32], clip: f64) -> (f64, std::ops::Range<usize>) {
     samples.sort_unstable_by(f32::total_cmp);
     let mut kept = 0..samples.len();
     loop {

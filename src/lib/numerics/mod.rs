@@ -1,10 +1,12 @@
 //! Mathematics that knows no camera.
 
 pub mod averages;
+pub mod cut_off;
 pub mod distribution;
 pub mod gauss;
 pub mod largest;
 pub mod least_squares;
+pub mod leveled;
 pub mod medians;
 pub mod moments;
 pub mod normal;

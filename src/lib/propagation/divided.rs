@@ -72,9 +72,8 @@ impl Photosite {
             let site = [x, u];
             let drawn = Drawn::codes(&self.model, &adc, expected_e, site);
             let mut above = drawn.less(&self.darks, &adc, site);
-            let mut below = flat.frames.drawn(&adc, light_e, site).less(&flat.darks, &adc, site);
+            let below = flat.drawn(&adc, light_e, site);
             above.mean -= flat.levels_adu[0];
-            below.mean -= flat.levels_adu[1];
             // Photosites that see no light are marked as defective.
             if below.mean <= 0.0 {
                 continue;
@@ -86,7 +85,8 @@ impl Photosite {
                 continue;
             }
             let of_both = |[a, b]: &[Dark; 2]| a.weight * b.weight * a.drawn(&adc, 0.0, site).variance;
-            let both = in_both.iter().map(of_both).sum::<f64>() / f;
+            let of_darks = if in_both.is_empty() { 1.0 } else { flat.share_of_darks(&adc, light_e, site) };
+            let both = of_darks * in_both.iter().map(of_both).sum::<f64>() / f;
             let first = (above.mean * (1.0 + rho - skew + 3.0 * rho * rho) - both) / f;
             let of_square = 1.0 + 3.0 * rho - 4.0 * skew + 15.0 * rho * rho;
             let square = ((above.mean.powi(2) + above.variance) * of_square - 4.0 * above.mean * both) / (f * f);
@@ -136,7 +136,7 @@ impl Photosite {
         let is_smooth = |dark: &Dark, expected_e: f64| self.of_dark(dark).is_smooth(dark, adc, expected_e);
         let mut averages = self.darks.iter().chain(&flat.darks).flatten();
         self.is_open(adc, expected_e)
-            && self.of_dark(&flat.frames).is_open(adc, light_e)
+            && flat.ends_e(light_e).into_iter().all(|end_e| self.of_dark(&flat.frames).is_open(adc, end_e))
             && is_smooth(&flat.frames, light_e)
             && averages.all(|dark| self.of_dark(dark).is_open(adc, 0.0) && is_smooth(dark, 0.0))
     }
@@ -163,8 +163,7 @@ impl Photosite {
     pub(super) fn check_flat(&self) -> Predicted<()> {
         let (Some(adc), Some(flat)) = (self.adc, self.flat) else { return Ok(()) };
         let is_quiet = |light_e: f64| {
-            let mut below = flat.frames.drawn(&adc, light_e, [1.0; 2]).less(&flat.darks, &adc, [1.0; 2]);
-            below.mean -= flat.levels_adu[1];
+            let below = flat.drawn(&adc, light_e, [1.0; 2]);
             below.mean > 0.0 && below.variance <= WIDE.noise * below.mean.powi(2)
         };
         if flat.expected_e.into_iter().all(is_quiet) { Ok(()) } else { Err(Unpredictable::Beyond(NOISY)) }
@@ -188,8 +187,7 @@ impl Photosite {
             return divided.moments.variance;
         }
         let (Some(adc), Some(flat)) = (self.adc, self.flat) else { return own };
-        let mut below = flat.frames.drawn(&adc, flat.expected_e[class], [1.0; 2]).less(&flat.darks, &adc, [1.0; 2]);
-        below.mean -= flat.levels_adu[1];
+        let below = flat.drawn(&adc, flat.expected_e[class], [1.0; 2]);
         let level = expected_e * adc.adu_per_e;
         let codes = (own - (self.model.response() * level).powi(2)).max(0.0);
         let rho = below.variance / below.mean.powi(2);

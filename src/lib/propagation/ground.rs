@@ -95,6 +95,10 @@ pub(super) fn subtracted(level: BlackLevel, with_deltas: bool) -> Predicted<f64>
         .ok_or(Unpredictable::Beyond("the black level that was subtracted differs among photosites"))
 }
 
+/// Why nothing is said behind medians of flats that were lit in other places each.
+const UNLIKE_FLATS: &str = "the median or clipped mean of flats counts whose light differed from place to place by more than their noise; use \
+                            `--combine mean`";
+
 /// Why nothing is predicted of a clipped mean of codes of little noise.
 const CLIPPED_BY_CODE: &str = "the noise of the dark or bias frames, over few codes, makes what their clipped mean leaves out hang \
                                on where in a code their mean lies; use `--combine mean` or `median`";
@@ -176,6 +180,9 @@ pub(super) fn corrected(frame: &FrameHeader, codes: Photosite) -> Predicted<Phot
         return Err(Unpredictable::Beyond(CLIPPED_BY_CODE));
     }
     if let Some(flat) = &correction.flat {
+        if flat.unlike_levels > 0.0 {
+            return Err(Unpredictable::Beyond(UNLIKE_FLATS));
+        }
         let adc = codes.adc.ok_or(Unpredictable::Missing("adc"))?;
         let mut flat = Flat::of(frame, flat, &adc, of_sensor).ok_or(unknown)?;
         let black_adu = correction.black_adu.mean();

@@ -381,7 +381,10 @@ impl Photosite {
             return LineTerms { constant, linear: 0.0, square: parts(&self.model)[2].powi(2) };
         };
         let of_flat = averages(&flat.darks);
-        let divisor = temporal(&flat.frames) + of_flat.iter().map(temporal).sum::<f64>();
+        // Lines have the same noise at all levels.
+        let of_frames = flat.levels.map_or_else(|| flat.frames.kept()[0], |levels| levels.at(1.0).variance);
+        let of_frames = of_frames * parts(&flat.frames.model)[0].powi(2);
+        let divisor = of_frames + of_flat.iter().map(temporal).sum::<f64>();
         let of_divisor = left(&flat.frames.model, &of_flat);
         let of_both = |[a, b]: [Dark; 2]| a.weight * b.weight * a.kept()[0] * parts(&a.model)[0].powi(2);
         let in_both: f64 = flat.in_both(&self.darks).map(of_both).sum();

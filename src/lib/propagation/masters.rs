@@ -4,6 +4,7 @@ use super::charge::sensitivity;
 use super::moments::Prediction;
 use crate::metadata::{AdcRecord, AverageRecord, FlatRecord, FrameHeader, MasterKind, MasterRecord, PoissonKind};
 use crate::numerics::averages::{CLIP, Combine, Kept, is_clipped_by_code};
+use crate::numerics::leveled::Leveled;
 use crate::stages::noise::{NoiseModel, Tails};
 use std::sync::{Mutex, PoisonError};
 
@@ -61,6 +62,25 @@ pub(super) fn kept(combine: Combine, frames: u32, clip: f64, std_codes: f64) -> 
     }
     let found = Kept::of(combine, frames, clip, std_codes);
     known.push((asked, found));
+    found
+}
+
+/// The share of a variance that a part of it is; all of none.
+fn share_of(part: f64, all: f64) -> f64 {
+    if all > 0.0 { part / all } else { 1.0 }
+}
+
+/// What averages of leveled samples keep, worked out once for each.
+fn leveled(combine: Combine, clip: f64, levels: &[f64]) -> Leveled {
+    static KNOWN: Mutex<Vec<(Combine, u64, Vec<u64>, Leveled)>> = Mutex::new(Vec::new());
+    let bits: Vec<u64> = levels.iter().map(|level| level.to_bits()).collect();
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let is_asked = |of: &&(Combine, u64, Vec<u64>, Leveled)| of.0 == combine && of.1 == clip.to_bits() && of.2 == bits;
+    if let Some((.., found)) = known.iter().find(is_asked) {
+        return *found;
+    }
+    let found = Leveled::of(combine, clip, levels);
+    known.push((combine, clip.to_bits(), bits, found));
     found
 }
 
@@ -172,6 +192,8 @@ pub struct Flat {
     pub counted_share: [f64; 3],
     /// The frames themselves: the noise of each, and how they were averaged.
     pub frames: Dark,
+    /// What their average keeps, where they were brought to one level first.
+    pub levels: Option<Leveled>,
     /// What came off them first.
     pub darks: [Option<Dark>; MOST_DARKS],
     /// Whether what came off them came off the frame that is divided too.
@@ -255,10 +277,43 @@ impl Flat {
             photosites: three(&photosites)?,
             counted_share: three(&counted)?,
             frames: Dark { weight: 1.0, is_bias: false, model, frames, combine, clip: clip.unwrap_or(CLIP) },
+            levels: (record.levels.len() > 1).then(|| leveled(combine, clip.unwrap_or(CLIP), &record.levels)),
             darks,
             shares_masters: record.shares_masters,
             levels_adu: [0.0, level_adu],
         })
+    }
+
+    /// F at a photosite, of a class of so many electrons.
+    ///
+    /// Of leveled frames, F = ⟨s (M − D)⟩: what M has of noise counts by the law of the average, what D has once for all frames.
+    pub(super) fn drawn(&self, adc: &AdcRecord, light_e: f64, site: [f64; 2]) -> Drawn {
+        let Some(levels) = &self.levels else {
+            let mut found = self.frames.drawn(adc, light_e, site).less(&self.darks, adc, site);
+            found.mean -= self.levels_adu[1];
+            return found;
+        };
+        let [one, unlit] = [light_e, 0.0].map(|light_e| Drawn::codes(&self.frames.model, adc, light_e, site));
+        let off =
+            Drawn { mean: unlit.mean - self.levels_adu[1], variance: 0.0, third: 0.0 }.less(&self.darks, adc, site);
+        let kept = levels.at(share_of(unlit.variance, one.variance));
+        let lean = if one.variance > 0.0 { one.third / (6.0 * one.variance) * kept.lean } else { 0.0 };
+        Drawn {
+            mean: one.mean - unlit.mean + kept.shift * off.mean + lean,
+            variance: kept.variance * one.variance + kept.shift.powi(2) * off.variance,
+            third: kept.variance.powi(2) * one.third + kept.shift.powi(3) * off.third,
+        }
+    }
+
+    /// What counts in F of what came off its frames, at such light.
+    pub(super) fn share_of_darks(&self, adc: &AdcRecord, light_e: f64, site: [f64; 2]) -> f64 {
+        let variance = |light_e: f64| Drawn::codes(&self.frames.model, adc, light_e, site).variance;
+        self.levels.as_ref().map_or(1.0, |levels| levels.at(share_of(variance(0.0), variance(light_e))).shift)
+    }
+
+    /// Electrons of the dimmest and of the brightest of its frames, of a class of so many on average.
+    pub(super) fn ends_e(&self, light_e: f64) -> [f64; 2] {
+        self.levels.as_ref().map_or([light_e; 2], |levels| levels.ends.map(|end| end * light_e))
     }
 
     /// The averages of the same frames that came off both, as they came off a frame and off the flat field: the bias, or all.

@@ -58,6 +58,10 @@ const BEFORE_THE_CONVERTER: &str = "it was averaged as electrons, and digitized 
 const NO_MEANS_OF_PIXELS: &str = "it is the median or clipped mean of frames that were demosaicked, whose channels it mixes; average \
                                   before demosaicking";
 
+/// Why nothing is said of medians of exposures of unlike light.
+const UNLIKE_LEVELS: &str = "it is the median or clipped mean of exposures whose light differed by more than their noise, the exposure in \
+                             the middle rather than an average; use `--combine mean`";
+
 /// Why nothing is said of averages of what is curved.
 const CURVED: &str = "it is an average of what is curved in the samples of photosites: hues, or colors that are not linear; average \
                       before these are made";
@@ -87,6 +91,9 @@ pub(super) fn average_of(
     record: &ExposuresRecord,
     of_sites: QuantityKind,
 ) -> Predicted<AverageRecord> {
+    if record.unlike_levels > 0.0 {
+        return Err(Unpredictable::Beyond(UNLIKE_LEVELS));
+    }
     let is_before = matches!(record.quantity, QuantityKind::Electrons | QuantityKind::ExpectedElectrons);
     let mut averaged = frame.clone();
     averaged.metadata.quantity = record.quantity;

@@ -13,8 +13,10 @@ use crate::numerics::running::Running;
 use crate::sigma::{PixelLayers, is_layer};
 use crate::stages::darks::Fitness;
 use crate::stages::exposures::{Exposures, too_few};
+use crate::stages::level_sums::{LevelSums, Unlike};
 use crate::stages::masters::Averaging;
 use crate::stages::saturation::{SATURATED, bits, with_mask};
+use crate::stages::sites::SiteClasses;
 use crate::stream::{RowSink, RowSource};
 use crate::units::QuantityKind;
 use clap::Args;
@@ -111,6 +113,41 @@ impl Samples {
             Self::All(stack) => stack.frames(),
         }
     }
+}
+
+impl Samples {
+    /// Where medians or clipped means are of exposures of unlike levels. Those in which noise was drawn are of one scene.
+    fn unlike_levels(&mut self, first: &FrameHeader, averaging: Averaging) -> Result<Option<Unlike>> {
+        let Self::All(stack) = self else { return Ok(None) };
+        let frames = stack.frames();
+        if averaging.combine == Combine::Mean || frames < 3 || first.metadata.noise.is_some() {
+            return Ok(None);
+        }
+        let (width, height) = (first.geometry.width, first.geometry.height);
+        let planes = first.geometry.channels.iter().position(|name| is_layer(name));
+        let planes = planes.unwrap_or(first.geometry.channels.len());
+        let classes = SiteClasses::of(first, planes);
+        let mut sums = LevelSums::of(frames, classes.count(), &first.geometry, classes.period()[0]);
+        let mut all = Vec::new();
+        for y in (0..height).filter(|y| Fitness::looks_at(*y)) {
+            stack.read(y * planes * width, planes * width, &mut all)?;
+            for plane in 0..planes {
+                let rows: Vec<&[f32]> =
+                    all.chunks_exact(planes * width).map(|row| &row[plane * width..][..width]).collect();
+                sums.take(y, &classes.row(y, plane), |_| true, &rows);
+            }
+        }
+        Ok(sums.unlike(None))
+    }
+}
+
+/// A warning of exposures whose light differs, of which there is no median.
+fn doubt_of_levels(first: &str, name: &str, Unlike { share, spread }: Unlike) -> String {
+    format!(
+        "{first}: in {:.0} % of it the light of the exposures differs, by {spread:.1} times the noise of one; there their {name} is the exposure in \
+         the middle, with the noise of one, and nothing is predicted of it; --combine mean takes all, and correct-frame brings flats to one level",
+        100.0 * share
+    )
 }
 
 impl SharedAverage {
@@ -238,12 +275,16 @@ impl Averaged {
         let mut warnings = Vec::new();
         let metadata = &mut header.metadata;
         let own = record;
+        let first = seen.exposures.first().clone();
+        let apart = seen.samples.unlike_levels(&first, averaging)?;
         if let Some(before) = &metadata.average {
             record = AverageRecord { frames: before.frames.saturating_mul(record.frames), ..record };
         }
         let name = averaging.name();
         metadata.averaged = seen.exposures.drawn();
-        metadata.average = Some(ExposuresRecord::of(record, metadata.quantity, metadata.demosaic.is_some()));
+        let unlike_levels = apart.map_or(0.0, |apart| apart.spread);
+        let record = ExposuresRecord::of(record, metadata.quantity, metadata.demosaic.is_some());
+        metadata.average = Some(ExposuresRecord { unlike_levels, ..record });
         /// Codes over which what is averaged scatters, so that rounding counts for nothing.
         const MANY_CODES: f64 = 16.0;
         // Each frame's black level has the noise of its own border, which is averaged as that of the frames.
@@ -262,6 +303,9 @@ impl Averaged {
             warnings.push(format!("{differs}; nothing is predicted of their average{colored}"));
         }
         warnings.extend(seen.unlike.take());
+        if let Some(apart) = apart {
+            warnings.push(doubt_of_levels(&first.name, name, apart));
+        }
         // A median is what it would be while fewer than half of its samples are full.
         let least = if averaging.combine == Combine::Median { frames.div_ceil(2) } else { 1 };
         let mut saturated = 0;

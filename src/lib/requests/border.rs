@@ -10,6 +10,7 @@ use crate::formats::places::in_stream;
 use crate::frame::{Geometry, to_sample};
 use crate::metadata::{BlackNoise, FrameHeader};
 use crate::numerics::averages::{Combine, average};
+use crate::numerics::cut_off::AtZero;
 use crate::stream::RowSource;
 use std::path::Path;
 
@@ -38,6 +39,7 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
     if sites.iter().any(Vec::is_empty) {
         return Err(frame.refuse("not all of its 2x2 sites have masked photosites"));
     }
+    let low = masked.lowest_codes();
     let levels = sites.each_mut().map(|of_site| average(Combine::Clipped, of_site, CLIP).0);
     masked.take_off(levels);
     let lines = Axis::BOTH.map(|axis| masked.lines(axis));
@@ -46,7 +48,7 @@ pub fn measure_black(frame: &mut FrameHeader, options: &InputOptions, border: Bo
     let noise = noise(&masked, along, &lines, offs.as_deref());
     let others = Axis::BOTH.into_iter().filter(|axis| Some(*axis) != along);
     let leans = others.filter_map(|axis| Lean::of(axis, &lines[axis as usize]));
-    let measured = MeasuredLevel { levels, site_adu2: noise.site_adu2, lean: leans.reduce(Lean::larger) };
+    let measured = MeasuredLevel { levels, site_adu2: noise.site_adu2, lean: leans.reduce(Lean::larger), low };
     let mut notes: Vec<Note> = measured.doubts(frame)?.into_iter().map(Note::Warning).collect();
     let deltas = along
         .zip(offs)
@@ -182,6 +184,12 @@ impl Masked {
         let mut sites: [Vec<f32>; 4] = Default::default();
         self.photosites.iter().for_each(|photosite| sites[self.site(photosite)].push(photosite.sample));
         sites
+    }
+
+    /// How many samples are the lowest codes.
+    fn lowest_codes(&self) -> AtZero {
+        let of = |code: f32| self.photosites.iter().filter(|photosite| photosite.sample == code).count() as f64;
+        AtZero { count: self.photosites.len() as f64, zeros: of(0.0), ones: of(1.0) }
     }
 
     /// Takes the level of its site off each sample.

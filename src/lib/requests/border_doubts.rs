@@ -6,6 +6,7 @@ use super::other_sensor::of_another_sensor;
 use crate::camera::levels::{BlackLevel, near_black};
 use crate::error::Result;
 use crate::metadata::FrameHeader;
+use crate::numerics::cut_off::AtZero;
 
 /// The level of a border.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,6 +17,8 @@ pub(super) struct MeasuredLevel {
     pub site_adu2: f64,
     /// How uneven the border is.
     pub lean: Option<Lean>,
+    /// How many of its photosites read 0, and 1.
+    pub low: AtZero,
 }
 
 impl MeasuredLevel {
@@ -33,7 +36,7 @@ impl MeasuredLevel {
             let level = BlackLevel::Sites(self.levels);
             of_another_sensor(frame, level, &format!("the level of its border, {:.1} ADU,", level.mean()))
         };
-        Ok(other.or_else(of_sensor).into_iter().chain(self.unevenness(frame)).collect())
+        Ok(other.or_else(of_sensor).into_iter().chain(self.unevenness(frame)).chain(self.cut_off(frame)).collect())
     }
 
     /// A warning of a level that is another than that of the metadata, by more than habit, noise and the dark signal of the exposure.
@@ -49,6 +52,20 @@ impl MeasuredLevel {
             "{}: its masked photosites (`masked_areas`) read {read:.1} ADU, and its metadata have a black level of {known:.1} ADU; one of the two \
              is wrong",
             frame.name
+        ))
+    }
+
+    /// A warning of a border whose samples are cut off at code 0.
+    fn cut_off(&self, frame: &FrameHeader) -> Option<String> {
+        /// Of less the tails of no law are known, and levels are told to so many ADU.
+        const LEAST_SHARE: f64 = 0.01;
+        const LEAST_ADU: f64 = 0.02;
+        let excess = self.low.excess(1.0).filter(|excess| self.low.share() > LEAST_SHARE && *excess > LEAST_ADU)?;
+        Some(format!(
+            "{}: {:.0} % of its masked photosites (`masked_areas`) read 0, where codes are cut off; as far as they are normal their mean is {excess:.2} \
+             ADU too high, and the frame too low by as much behind it; have the camera add an offset, or give its bias, --black",
+            frame.name,
+            100.0 * self.low.share()
         ))
     }
 

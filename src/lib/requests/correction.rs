@@ -1,6 +1,7 @@
 //! Corrections of a frame of codes before demosaicking.
 
 use super::border::measure_black;
+use super::correction_doubts::{doubt_of_cut_off, doubt_of_limits, doubts_of_flats, said_of_levels};
 use super::dark_levels::{DarkLevels, doubt_of_dark, doubt_of_one};
 use super::described::{Described, doubt_of_black};
 use super::independence::{Company, Role, check_contents, check_files};
@@ -19,15 +20,12 @@ use crate::numerics::averages::{CLIP, Combine};
 use crate::stages::black::Black;
 use crate::stages::correct::{CorrectFrame, CorrectionSettings};
 use crate::stages::darks::{DarkFrames, DarkLimits, DarkSettings};
-use crate::stages::defects::{DefectMap, beyond_chance, lost_beyond};
-use crate::stages::flats::{FlatFrames, FlatMeans};
+use crate::stages::defects::{DefectMap, beyond_chance};
+use crate::stages::flats::{FlatFrames, FlatLevels, FlatMeans};
 use crate::stages::masters::Averaging;
 use crate::stream::{RowSource, Stage};
 use clap::{ArgGroup, Args};
 use std::path::{Path, PathBuf};
-
-/// The share of a variance that limits may take unsaid.
-const LEAST_LOST: f64 = 1e-3;
 
 /// What is corrected, and by which frames.
 #[derive(Debug, Clone, Args)]
@@ -294,13 +292,33 @@ impl Correction {
         })
     }
 
+    /// Reads flats for what they are on the whole: their levels, where these count, and the means of their classes.
+    fn surveyed(
+        &self,
+        light: &Light,
+        flats: Option<FlatFrames<OneOfMany>>,
+        beyond: Option<f64>,
+    ) -> Result<Option<(FlatFrames<OneOfMany>, FlatMeans)>> {
+        let Some(flats) = flats else { return Ok(None) };
+        let again = || self.flats(light, &mut Company::default());
+        let levels = if flats.wants_levels() { again()?.map(FlatFrames::levels).transpose()? } else { None };
+        let means = self.flat_means(light, flats.at(levels.clone()), beyond, levels.as_ref())?;
+        Ok(again()?.map(|flats| (flats.at(levels), means)))
+    }
+
     /// Reads flats for the means of their classes; where defects are looked for twice, so that what is found does not count.
-    fn flat_means(&self, light: &Light, flats: FlatFrames<OneOfMany>, beyond: Option<f64>) -> Result<FlatMeans> {
+    fn flat_means(
+        &self,
+        light: &Light,
+        flats: FlatFrames<OneOfMany>,
+        beyond: Option<f64>,
+        levels: Option<&FlatLevels>,
+    ) -> Result<FlatMeans> {
         let map = || self.map(light);
         let found = flats.survey(beyond, map()?, None)?;
         let Some(limits) = found.limits() else { return Ok(found) };
         match self.flats(light, &mut Company::default())? {
-            Some(flats) => Ok(flats.survey(None, map()?, Some(limits))?.within(limits)),
+            Some(flats) => Ok(flats.at(levels.cloned()).survey(None, map()?, Some(limits))?.within(limits)),
             None => Ok(found),
         }
     }
@@ -354,23 +372,17 @@ impl Correction {
             Some((beyond, darks)) => Some(darks?.survey(beyond)?),
             None => None,
         };
-        let flats = match flats {
-            Some(flats) => {
-                let means = self.flat_means(light, flats, beyond)?;
-                self.flats(light, again)?.map(|flats| (flats, means))
-            }
-            None => None,
-        };
+        let flats = self.surveyed(light, flats, beyond)?;
         if let Some((flats, means)) = &flats {
             warnings.extend_from_slice(flats.warnings());
-            warnings.extend(doubt_of_flats(means));
-            warnings.extend(means.doubt.clone());
+            warnings.extend(doubts_of_flats(flats, means, frame));
         }
         warnings.extend(self.find_defects.flatten().and_then(doubt_of_limits));
         let sources =
             darks.iter().flat_map(DarkFrames::frames).chain(flats.iter().flat_map(|(flats, _)| flats.frames()));
         let mut remarks: Vec<String> = sources.flat_map(|source| source.notes().to_vec()).collect();
         remarks.extend(darks.iter().flat_map(|darks| darks.stack().remarks().to_vec()));
+        remarks.extend(flats.iter().filter_map(|(flats, _)| said_of_levels(flats)));
         let on_trust = darks.as_ref().and_then(|darks| darks.stack().taken_on_trust(frame));
         remarks.extend(on_trust.clone().filter(|text| !warnings.contains(text)));
         let levels = DarkLevels::of(frame, darks.as_ref().map(DarkFrames::stack), on_trust.is_some());
@@ -432,29 +444,6 @@ impl Correction {
     }
 }
 
-/// A warning of limits, in standard deviations, that mark so many ordinary photosites that variances fall short.
-fn doubt_of_limits(beyond: f64) -> Option<String> {
-    let [share, variance] = lost_beyond(beyond);
-    (variance > LEAST_LOST).then(|| {
-        format!(
-            "limits of {beyond} standard deviations mark ordinary photosites too, {:.2} % of them; up to {:.1} % of the variance \
-             of the frames they are found in goes with them, which no prediction knows",
-            100.0 * share,
-            100.0 * variance
-        )
-    })
-}
-
-/// A warning of flats that are saturated.
-fn doubt_of_flats(means: &FlatMeans) -> Option<String> {
-    (means.full > 0).then(|| {
-        format!(
-            "{} photosites of the flats are saturated; they are marked, and the means of all classes are those of places where none is",
-            means.full
-        )
-    })
-}
-
 /// A digest of a list or map of defects; none of one that cannot be read, which is told elsewhere.
 fn digest_of(path: &Path) -> Option<String> {
     read_file(path).ok().map(|bytes| format!("blake3:{}", blake3::hash(&bytes).to_hex()))
@@ -477,9 +466,17 @@ impl OpenCorrection {
         ];
         let level = darks.as_ref().and_then(|darks| self.levels.doubt(&self.header().name, darks));
         let unlike = darks.as_ref().and_then(DarkFrames::unlike);
+        let cut_off = darks.as_ref().and_then(|darks| Some((darks.cut_off()?, darks.means()?)));
+        let cut_off =
+            cut_off.filter(|_| level.is_none()).and_then(|(cut, [all, off])| doubt_of_cut_off(&cut, all - off));
+        let cut_off_flats = flats.as_ref().and_then(|(flats, _)| {
+            let (darks, light) = (flats.darks()?, flats.mean()?);
+            doubt_of_cut_off(&darks.cut_off()?, light - darks.mean()?)
+        });
         let of_flats = flats.as_ref().zip(self.levels_of_flats.as_ref());
         let of_flats = of_flats.map_or(Vec::new(), |((flats, _), levels)| levels.doubts_of_flats(flats));
-        let level = level.into_iter().chain(unlike.map(doubt_of_one)).chain(of_flats);
+        let level =
+            level.into_iter().chain(unlike.map(doubt_of_one)).chain(of_flats).chain(cut_off).chain(cut_off_flats);
         let doubt = map.as_ref().and_then(DefectMap::finding).into_iter().chain(level).map(Note::Warning);
         said.into_iter().flatten().map(Note::Remark).chain(doubt).collect()
     }

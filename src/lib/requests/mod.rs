@@ -24,6 +24,7 @@ mod border_lines;
 pub mod comparison;
 pub mod conversion;
 pub mod correction;
+mod correction_doubts;
 mod dark_levels;
 pub mod described;
 pub mod fit;

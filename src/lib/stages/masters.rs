@@ -1,9 +1,11 @@
 //! Frames of one kind that count as one: their average, sample by sample, while all are read in step.
 
 use crate::error::Result;
+use crate::frame::to_sample;
 use crate::metadata::{AverageRecord, FrameHeader};
 use crate::names::Named;
 use crate::numerics::averages::{CLIP, Combine, average};
+use crate::numerics::cut_off::AtZero;
 use crate::stream::RowSource;
 use rayon::prelude::*;
 
@@ -75,6 +77,23 @@ impl Averaging {
     }
 }
 
+/// How samples are brought to one level before they are averaged: what no light reads comes off, and the rest is multiplied.
+#[derive(Debug, Clone, Copy)]
+pub struct Leveling<'a> {
+    /// What comes off each sample of some rows.
+    pub off: &'a [f64],
+    /// What samples of each frame are multiplied by, class by class.
+    pub factors: &'a [Vec<f64>],
+    /// The class of each sample of these rows.
+    pub classes: &'a [usize],
+}
+
+impl Leveling<'_> {
+    fn sample(&self, frame: usize, place: usize, sample: f32) -> f32 {
+        to_sample((f64::from(sample) - self.off[place]) * self.factors[frame][self.classes[place]])
+    }
+}
+
 /// What the rows of all frames may take that an average needs at a time, where it is no mean.
 const ALL_BYTES: usize = 64 << 20;
 
@@ -104,9 +123,10 @@ struct Level {
     count: f64,
     sum: f64,
     squares: f64,
-    /// How many are below zero, exactly zero, and no whole numbers.
+    /// How many are below zero, exactly zero, exactly one, and no whole numbers.
     below_zero: f64,
     at_zero: f64,
+    at_one: f64,
     fractional: f64,
 }
 
@@ -114,7 +134,7 @@ impl Level {
     /// Takes in samples, in lanes of their own so that one sum need not wait for another.
     fn take(&mut self, samples: &[f32]) {
         const LANES: usize = 8;
-        let mut lanes = [[0.0_f64; LANES]; 6];
+        let mut lanes = [[0.0_f64; LANES]; 7];
         for chunk in samples.chunks(LANES) {
             for (lane, sample) in chunk.iter().enumerate() {
                 let (one, sample) = if sample.is_finite() { (1.0, f64::from(*sample)) } else { (0.0, 0.0) };
@@ -123,15 +143,17 @@ impl Level {
                 lanes[2][lane] += sample * sample;
                 lanes[3][lane] += if sample < 0.0 { 1.0 } else { 0.0 };
                 lanes[4][lane] += if sample == 0.0 { one } else { 0.0 };
-                lanes[5][lane] += if sample.fract() == 0.0 { 0.0 } else { 1.0 };
+                lanes[5][lane] += if sample == 1.0 { 1.0 } else { 0.0 };
+                lanes[6][lane] += if sample.fract() == 0.0 { 0.0 } else { 1.0 };
             }
         }
-        let [count, sum, squares, below_zero, at_zero, fractional] = lanes.map(|lane| lane.iter().sum::<f64>());
+        let [count, sum, squares, below_zero, at_zero, at_one, fractional] = lanes.map(|lane| lane.iter().sum::<f64>());
         self.count += count;
         self.sum += sum;
         self.squares += squares;
         self.below_zero += below_zero;
         self.at_zero += at_zero;
+        self.at_one += at_one;
         self.fractional += fractional;
     }
 }
@@ -196,6 +218,13 @@ impl<S: RowSource> Frames<S> {
         Some((frame.header().name.as_str(), share))
     }
 
+    /// How many samples of all so far are the lowest codes; none of any that are no codes as a converter gave them.
+    pub fn lowest_codes(&self) -> Option<AtZero> {
+        let one = |level: &Level| AtZero { count: level.count, zeros: level.at_zero, ones: level.at_one };
+        let are_codes = self.levels.iter().all(|level| level.below_zero == 0.0 && level.fractional == 0.0);
+        are_codes.then(|| self.levels.iter().map(one).fold(AtZero::default(), AtZero::plus))
+    }
+
     /// Whether most samples of all so far are no whole numbers, as no camera writes them.
     pub fn are_fractional(&self) -> bool {
         let [fractional, count] =
@@ -228,6 +257,11 @@ impl<S: RowSource> Frames<S> {
         &self.largest
     }
 
+    /// How they are averaged.
+    pub fn averaging(&self) -> Averaging {
+        self.averaging
+    }
+
     /// Samples that were clipped so far.
     pub fn clipped(&self) -> u64 {
         self.clipped
@@ -239,6 +273,15 @@ impl<S: RowSource> Frames<S> {
     ///
     /// Those of the frames.
     pub fn next(&mut self, rows: usize, made: &mut Vec<f64>) -> Result<()> {
+        self.next_leveled(rows, None, made)
+    }
+
+    /// The same of samples that are brought to one level first, which means do not need.
+    ///
+    /// # Errors
+    ///
+    /// Those of the frames.
+    pub fn next_leveled(&mut self, rows: usize, leveling: Option<Leveling>, made: &mut Vec<f64>) -> Result<()> {
         made.clear();
         self.scatter.clear();
         self.largest.clear();
@@ -250,7 +293,7 @@ impl<S: RowSource> Frames<S> {
         let mut left = rows;
         while left > 0 {
             let step = (ALL_BYTES / row_bytes).clamp(1, left);
-            self.average(step * row_samples, step, made)?;
+            self.average(step * row_samples, step, leveling, made)?;
             left -= step;
         }
         Ok(())
@@ -290,7 +333,19 @@ impl<S: RowSource> Frames<S> {
         Ok(())
     }
 
-    fn average(&mut self, samples: usize, rows: usize, made: &mut Vec<f64>) -> Result<()> {
+    /// Reads the next `rows` rows of each frame, one behind another.
+    ///
+    /// # Errors
+    ///
+    /// Those of the frames.
+    pub fn read_each(&mut self, rows: usize) -> Result<&[f32]> {
+        self.largest.clear();
+        let samples = self.frames.first().map_or(0, |frame| rows * frame.header().geometry.row_samples());
+        self.read_all(samples, rows)?;
+        Ok(&self.band)
+    }
+
+    fn read_all(&mut self, samples: usize, rows: usize) -> Result<()> {
         self.band.clear();
         self.levels.resize(self.frames.len(), Level::default());
         for (frame, level) in self.frames.iter_mut().zip(&mut self.levels) {
@@ -301,8 +356,13 @@ impl<S: RowSource> Frames<S> {
         if self.keeps_largest {
             let start = self.largest.len();
             self.largest.resize(start + samples, f32::NEG_INFINITY);
-            self.band.chunks_exact(samples).for_each(|frame| raise(&mut self.largest[start..], frame));
+            self.band.chunks_exact(samples.max(1)).for_each(|frame| raise(&mut self.largest[start..], frame));
         }
+        Ok(())
+    }
+
+    fn average(&mut self, samples: usize, rows: usize, leveling: Option<Leveling>, made: &mut Vec<f64>) -> Result<()> {
+        self.read_all(samples, rows)?;
         let start = made.len();
         made.resize(start + samples, 0.0);
         let kept = self.scatter.len();
@@ -315,7 +375,11 @@ impl<S: RowSource> Frames<S> {
             let mut variances = Vec::new();
             for (index, made) in made.iter_mut().enumerate() {
                 of_site.clear();
-                of_site.extend((0..count).map(|frame| band[frame * samples + first + index]));
+                let place = first + index;
+                of_site.extend((0..count).map(|frame| match &leveling {
+                    None => band[frame * samples + place],
+                    Some(leveling) => leveling.sample(frame, start + place, band[frame * samples + place]),
+                }));
                 if scatter.is_some() {
                     variances.push(variance(&of_site));
                 }

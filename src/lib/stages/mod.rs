@@ -16,6 +16,7 @@ pub mod darks;
 pub mod defects;
 pub mod exposures;
 pub mod flats;
+pub mod level_sums;
 pub mod masters;
 pub mod sites;
 

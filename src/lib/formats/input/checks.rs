@@ -1,5 +1,7 @@
 //! What is looked for in the samples of a frame while they are read.
 
+mod steps;
+
 use super::codes::CodeCheck;
 use super::levels::LevelCheck;
 use super::masked::MaskedCheck;
@@ -8,6 +10,7 @@ use super::top::TopCheck;
 use crate::camera::levels::{BlackLevel, BlackLevels};
 use crate::error::Result;
 use crate::metadata::FrameHeader;
+use steps::StepCheck;
 
 /// Checks of samples against metadata.
 #[derive(Debug, Default)]
@@ -23,6 +26,7 @@ pub(super) struct Checks {
     top: Option<TopCheck>,
     masked: Option<MaskedCheck>,
     time: Option<TimeCheck>,
+    steps: Option<StepCheck>,
 }
 
 impl Checks {
@@ -37,6 +41,7 @@ impl Checks {
         if are_stored {
             (self.codes, self.levels) = (CodeCheck::of(frame), LevelCheck::of(frame, self.said_black));
             self.top = TopCheck::of(frame).filter(|_| self.tells_top && !is_marked);
+            self.steps = StepCheck::of(frame).filter(|_| !is_marked);
             self.time = TimeCheck::of(frame, is_tagged).filter(|_| self.tells_top);
             self.masked = self.taken_black.take().and_then(|black| MaskedCheck::of(frame, black));
         }
@@ -53,6 +58,7 @@ impl Checks {
         self.top.iter_mut().for_each(|top| top.look(rows, frame));
         self.masked.iter_mut().for_each(|masked| masked.look(rows, frame));
         self.time.iter_mut().for_each(|time| time.look(rows, frame));
+        self.steps.iter_mut().for_each(|steps| steps.look(rows, frame));
         Ok(())
     }
 
@@ -65,6 +71,7 @@ impl Checks {
         self.top.take().iter().for_each(|top| top.end(frame));
         self.masked.take().into_iter().for_each(|masked| masked.end(frame));
         self.time.take().into_iter().for_each(|time| time.end(frame));
+        self.steps.take().iter().for_each(|steps| steps.end(frame));
         self.levels.as_mut().map_or(Ok(()), |levels| levels.end(frame))
     }
 }

@@ -4,7 +4,7 @@ use super::fitness::{Fitness, Misfit};
 use super::stack::{DarkSettings, DarkStack, Master};
 use crate::error::Result;
 use crate::frame::to_sample;
-use crate::metadata::{FrameHeader, MasterKind};
+use crate::metadata::{FrameHeader, MasterKind, MasterRecord};
 use crate::numerics::averages::Combine;
 use crate::numerics::steps::Steps;
 use crate::numerics::vectors::{self, Kernel};
@@ -162,6 +162,11 @@ impl<S: RowSource> DarkFrames<S> {
             return None;
         }
         self.of_darks().find_map(Frames::at_zero)
+    }
+
+    /// The averages, and how each counts.
+    pub(super) fn averages(&self) -> impl Iterator<Item = (&Frames<S>, &MasterRecord)> {
+        self.masters.iter().zip(self.stack.masters.iter().map(|master| &master.record))
     }
 
     /// Averages of dark frames.

@@ -12,6 +12,8 @@ pub struct FlatMeans {
     pub(super) left_out: Vec<u64>,
     /// Photosites that are saturated in a flat.
     pub full: u64,
+    /// What F scatters by from photosite to photosite, noise and response, in shares of the mean; of the class where that is most.
+    pub scatter: f64,
     /// Ordinary values of F by class, ADU.
     pub(super) limits: Option<Vec<[f64; 2]>>,
     /// How they were lit.

@@ -7,6 +7,8 @@
 //! same places, and light that falls off towards the corners is the same share of each.
 
 mod blocks;
+mod leveling;
+mod levels;
 mod means;
 mod tally;
 
@@ -25,6 +27,7 @@ use blocks::Blocks;
 use std::ops::Range;
 use tally::Tally;
 
+pub use levels::FlatLevels;
 pub use means::FlatMeans;
 
 /// What no light reads in flats.
@@ -48,6 +51,9 @@ pub struct FlatFrames<S> {
     passages: Vec<Passage<Transfer>>,
     rows_made: usize,
     made: Vec<f64>,
+    /// What no light reads in the last rows.
+    off: Vec<f64>,
+    levels: Option<FlatLevels>,
     /// How what comes off goes with the flats.
     fitness: Fitness,
     warnings: Vec<String>,
@@ -124,6 +130,8 @@ impl<S: RowSource> FlatFrames<S> {
             passages,
             rows_made: 0,
             made,
+            off: Vec::new(),
+            levels: None,
             fitness: Fitness::default(),
             warnings,
         }))
@@ -172,42 +180,14 @@ impl<S: RowSource> FlatFrames<S> {
         self.darks()?.at_zero_beside(&self.fitness)
     }
 
+    /// The mean of what was read of the flats so far, as they are.
+    pub fn mean(&self) -> Option<f64> {
+        self.frames.level()
+    }
+
     /// Samples of theirs that were clipped so far.
     pub fn clipped(&self) -> u64 {
         self.frames.clipped() + self.darks().map_or(0, DarkFrames::clipped)
-    }
-
-    /// Makes F of the next rows.
-    fn next(&mut self, rows: usize) -> Result<()> {
-        let (width, planes) = (self.head.geometry.width, self.head.geometry.channels.len());
-        self.frames.next(rows, &mut self.made)?;
-        match &mut self.pedestal {
-            Pedestal::Frames(darks) => {
-                let darks = darks.next(rows)?;
-                let lines = self.made.chunks_exact(width).zip(darks.chunks_exact(width)).enumerate();
-                for (_, (flat, dark)) in lines.filter(|(index, _)| Fitness::looks_at(self.rows_made + index / planes)) {
-                    let flat: Vec<f32> = flat.iter().map(|sample| to_sample(*sample)).collect();
-                    // Averages of any number scatter by less than one dark frame.
-                    self.fitness.take(&flat, dark, None);
-                }
-                self.made.iter_mut().zip(darks).for_each(|(flat, dark)| *flat -= dark);
-            }
-            Pedestal::Level(level) => {
-                for (index, line) in self.made.chunks_exact_mut(width).enumerate() {
-                    let black = level.row(self.rows_made + index / planes);
-                    line.iter_mut().enumerate().for_each(|(x, flat)| *flat -= black.at(x));
-                }
-            }
-        }
-        if self.transfer.is_some() {
-            for (index, line) in self.made.chunks_exact_mut(width).enumerate() {
-                let (y, passage) = (self.rows_made + index / planes, &mut self.passages[index % planes]);
-                passage.entering(y).copy_from_slice(line);
-                line.copy_from_slice(passage.leaving(y));
-            }
-        }
-        self.rows_made += rows;
-        Ok(())
     }
 
     /// Reads all rows for the means of the classes and, for defects beyond so many standard deviations, what is ordinary; photosites of
@@ -350,7 +330,9 @@ impl<S: RowSource> FlatFrames<S> {
         let doubt = self.doubt_of_array(tally);
         let illumination = tally.blocks.illumination(&means);
         let full = full.iter().sum();
-        Ok(FlatMeans { means, photosites: counts.clone(), left_out, full, limits, illumination, doubt })
+        let share = |class: usize| Some(tally.scatter(class)? / means[class]).filter(|_| counts[class] > 0);
+        let scatter = (0..self.classes.count()).filter_map(share).fold(0.0, f64::max);
+        Ok(FlatMeans { means, photosites: counts.clone(), left_out, full, scatter, limits, illumination, doubt })
     }
 
     /// What is wrong with the array that they are said to be behind, Bayer or none, or that nothing tells, where what photosites scatter by
@@ -374,8 +356,15 @@ impl<S: RowSource> FlatFrames<S> {
             Pedestal::Level(level) => (Vec::new(), level.uniform()),
         };
         let metadata = &self.head.metadata;
+        let levels = self.levels.as_ref();
+        let unlike = levels.and_then(|levels| levels.unlike).map_or(0.0, |unlike| unlike.spread);
+        // Frames may be medians themselves.
+        let of_average = |flat: &S| flat.header().metadata.average.map_or(0.0, |average| average.unlike_levels);
+        let before = self.frames.frames().map(of_average).fold(0.0, f64::max);
         FlatRecord {
             average: self.average,
+            levels: levels.and_then(FlatLevels::shares).map_or_else(Vec::new, <[f64]>::to_vec),
+            unlike_levels: unlike.max(before),
             means_adu: means.means.clone(),
             photosites: means.photosites.clone(),
             left_out: means.left_out.clone(),
