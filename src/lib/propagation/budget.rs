@@ -370,8 +370,8 @@ impl Photosite {
             budget[Cause::Quantization as usize] = endless - charge;
             if !law.is_plain(adc) {
                 let patterns = sum_of(&budget, &PATTERNS) + sum_of(&budget, &OFFSETS);
-                let fixed = self.shared(adc, (expected_e, None), (self, None), false).light;
-                let clipped = at_most(fixed, whole) - patterns;
+                let fixed = whole - self.temporal_variance(expected_e, whole);
+                let clipped = fixed - patterns;
                 let further = clipped - budget[Cause::ClippedPattern as usize];
                 // What takes too long is no number, and stays none.
                 let is_told = further.is_nan() || further.abs() > 1e-9 * patterns;

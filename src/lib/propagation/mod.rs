@@ -5,6 +5,7 @@
 //! of \[HP2005], [`frame`] how the head of a frame leads to its moments.
 
 mod amplitudes;
+mod anew;
 mod bent;
 mod blur;
 pub mod budget;

@@ -31,8 +31,6 @@ pub(super) struct Knee {
 impl Axis {
     /// Widest panel of what bends at knees alone, in standard deviations.
     const WIDEST: f64 = 3.0;
-    /// Bends narrower than this are ends of panels.
-    const NARROWEST: f64 = 1e-7;
 
     pub fn of(charge: &Charge) -> Self {
         let rate = charge.rate.max(0.0);
@@ -76,31 +74,40 @@ impl Axis {
         if let Some(rule) = Self::smooth_rule(knees).filter(|_| lowest <= -REACH && !is_curved) {
             return rule.iter().map(|(z, weight)| (1.0 + self.sigma * z, *weight)).collect();
         }
-        let mut ends = vec![lowest, REACH];
-        let mut end = -REACH;
-        while end < REACH {
-            ends.push(end);
-            end += self.widest;
-        }
-        for knee in knees {
-            ends.push(knee.z);
-            let mut distance = 3.0 * knee.width.max(Self::NARROWEST);
-            while distance < self.widest {
-                ends.extend([knee.z - distance, knee.z + distance]);
-                distance *= 2.5;
-            }
-        }
-        ends.retain(|end| (lowest..=REACH).contains(end));
-        ends.sort_by(f64::total_cmp);
-        ends.dedup_by(|next, kept| *next - *kept < 1e-9);
         // Those below zero are zero.
         let mut found = vec![(0.0, cumulative(lowest))];
-        for pair in ends.windows(2) {
-            found.extend(panel(pair[0], pair[1]).map(|(z, weight)| (1.0 + self.sigma * z, weight * density(z))));
-        }
+        let places = between(lowest, self.widest, knees).into_iter();
+        found.extend(places.map(|(z, weight)| (1.0 + self.sigma * z, weight)));
         found.retain(|(_, weight)| *weight > LEAST_WEIGHT);
         found
     }
+}
+
+/// Places of a normal variable above the lowest, and their weights, for a function that bends at `knees` and is smooth over `widest`
+/// elsewhere: panels that grow with the distance from each.
+pub(super) fn between(lowest: f64, widest: f64, knees: &[Knee]) -> Vec<(f64, f64)> {
+    /// Bends narrower than this are ends of panels.
+    const NARROWEST: f64 = 1e-7;
+    let mut ends = vec![lowest, REACH];
+    let mut end = -REACH;
+    while end < REACH {
+        ends.push(end);
+        end += widest;
+    }
+    for knee in knees {
+        ends.push(knee.z);
+        let mut distance = 3.0 * knee.width.max(NARROWEST);
+        while distance < widest {
+            ends.extend([knee.z - distance, knee.z + distance]);
+            distance *= 2.5;
+        }
+    }
+    ends.retain(|end| (lowest..=REACH).contains(end));
+    ends.sort_by(f64::total_cmp);
+    ends.dedup_by(|next, kept| *next - *kept < 1e-9);
+    let of_panel = |pair: &[f64]| panel(pair[0], pair[1]).map(|(z, weight)| (z, weight * density(z)));
+    let all = ends.windows(2).flat_map(of_panel);
+    all.filter(|(_, weight)| *weight > LEAST_WEIGHT).collect()
 }
 
 /// Weights below this do not count.

@@ -16,11 +16,13 @@
 //! measured variances scatter, are sums over photosites and their counts ([`population`](super::population)); so are medians of
 //! codes that scatter over less than a code, or are far from normal.
 
+use super::anew::drawn_anew;
 use super::counts::Charge;
 use super::law::Law;
 use super::masters::{Dark, MOST_DARKS, kept};
 use super::moments::{Equations, LineCovariance, Prediction};
 use super::photosite::Photosite;
+use super::reading::codes_of;
 use super::unlike::Temporal;
 use super::unpredictable::{Predicted, TOO_LONG, Unpredictable};
 use crate::metadata::{AdcRecord, AverageRecord, ExposuresRecord, FrameHeader};
@@ -38,6 +40,9 @@ const NO_MEANS: &str = "medians and clipped means of exposures whose rows or col
 /// The standard deviation, in codes, of what is drawn anew below which the means of photosites show how codes are rounded: what
 /// that does to their variance is less than e^(−4π²σ²)/2π², 10⁻⁵ of a squared code.
 const VISIBLE: f64 = 0.46;
+
+/// The same where full well or an end of the codes is within reach.
+const VISIBLE_AT_ENDS: f64 = 4.0;
 
 /// Why nothing is said of clipped means of codes of little noise.
 pub(super) const CLIPPED_BY_CODE: &str = "the noise of its exposures, over few codes, makes what their clipped mean leaves out hang on \
@@ -170,21 +175,44 @@ impl Photosite {
                 && cumulative(-1.0 / charge.pattern) * adc.adu_per_e * charge.rate > SHOWS * most * most
                 && std_codes(model, expected_e) < VISIBLE
         };
-        most < VISIBLE
-            || are_apart(&law.light, (self.model, 0.0))
-            || are_apart(&law.dark, (NoiseModel { dark_e: 0.0, ..self.model }, expected_e))
+        !self.is_rare
+            && (most < VISIBLE
+                || are_apart(&law.light, (self.model, 0.0))
+                || are_apart(&law.dark, (NoiseModel { dark_e: 0.0, ..self.model }, expected_e)))
     }
 
     /// E v of samples that nothing came off.
     pub(super) fn temporal_variance(&self, expected_e: f64, whole: f64) -> f64 {
-        let anew = match self.adc.filter(|adc| self.equations == Equations::Exact && self.shows_codes(adc, expected_e))
-        {
-            Some(_) if self.has_tails() => self.mixed_temporal(expected_e),
-            Some(adc) => whole - self.shared(&adc, (expected_e, None), (self, None), true).light,
-            None => whole - self.fixed_variance(expected_e),
+        let adc = self.adc.filter(|_| self.equations == Equations::Exact);
+        let anew = match adc {
+            Some(adc) if self.has_tails() && self.shows_codes(&adc, expected_e) => self.mixed_temporal(expected_e),
+            Some(adc) if !self.has_tails() && (self.shows_codes(&adc, expected_e) || self.ends(&adc, expected_e)) => {
+                self.codes_anew(&adc, expected_e, whole)
+            }
+            Some(adc) if !self.has_tails() => whole - self.shared(&adc, (expected_e, None), (self, None), false).light,
+            _ => whole - self.fixed_variance(expected_e),
         };
         // What takes too long is no number.
         if (whole - anew).is_nan() { f64::NAN } else { anew.clamp(0.0, whole) }
+    }
+
+    /// Whether they show it where full well, or an end of the codes, cuts off more than next to none.
+    fn ends(&self, adc: &AdcRecord, expected_e: f64) -> bool {
+        const NEXT_TO_NONE: f64 = 1e-7;
+        if self.is_rare || Dark::mean_of(self.model, 1).std_codes(adc, expected_e) >= VISIBLE_AT_ENDS {
+            return false;
+        }
+        let law = Law::of(&self.model, expected_e);
+        let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
+        law.reaches_full_well() && law.reaches(law.full_well_e) > NEXT_TO_NONE
+            || !law.is_within(adc)
+                && (law.is_read_from(upper) > NEXT_TO_NONE || law.is_read_from(lower) < 1.0 - NEXT_TO_NONE)
+    }
+
+    /// E v of codes.
+    fn codes_anew(&self, adc: &AdcRecord, expected_e: f64, whole: f64) -> f64 {
+        let law = Law { read_noise_e: self.model.read_noise(), ..Law::of(&self.model, expected_e) };
+        drawn_anew(&law, adc, codes_of(adc), self.model.offsets()).of(whole)
     }
 }
 

@@ -401,6 +401,11 @@ impl Photosite {
 
     /// What is drawn anew in each exposure where the rounding of codes shows: its mean over photosites of all kinds.
     pub(super) fn mixed_temporal(&self, expected_e: f64) -> f64 {
+        thread_local! { static KNOWN: Memory<(Photosite, f64), f64> = const { Memory::new() }; }
+        KNOWN.with(|known| known.recall((*self, expected_e), |(site, expected_e)| site.temporal_of_kinds(*expected_e)))
+    }
+
+    fn temporal_of_kinds(&self, expected_e: f64) -> f64 {
         let [jumps, ..] = self.jump_cumulants();
         let drawn = |site: &Self| site.temporal_variance(expected_e, site.moments(expected_e).moments.variance);
         let kinds = effort::within(MOST_WORK, || self.each_of(expected_e, true, drawn));

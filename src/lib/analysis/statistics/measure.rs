@@ -88,6 +88,7 @@ fn measure_all(
     let mut watch = Watch::new(source, saturated, regions);
     let frame = watch.header().clone();
     let levels = Levels::of(&frame)?;
+    let at_hand = at_hand(&mut watch, regions, (saturated, &levels), level.is_some() && !is_drawn)?;
     // Laws hang on the head of the frame alone: they are worked out while the programs before this one make its rows.
     let known = laws.of(&frame, equations);
     // What several amplifiers have read differs from region to region.
@@ -106,16 +107,15 @@ fn measure_all(
         let drawn = of_region.as_ref().ok().filter(is_alike);
         Portrait::new(&frame, regions[0], drawn)
     });
-    let tallies = match &mut portrait {
-        Some(portrait) => tallies(&mut sitting(&mut watch, portrait), regions, &levels)?,
-        None => tallies(&mut watch, regions, &levels)?,
+    let tallies = match (at_hand, &mut portrait) {
+        (Some(tallies), _) => tallies,
+        (None, Some(portrait)) => tallies(&mut sitting(&mut watch, portrait), regions, &levels)?,
+        (None, None) => tallies(&mut watch, regions, &levels)?,
     };
-    let watched = watch.untold();
-    let (counts, left_out) = watch.seen();
     if level.is_some() {
-        check_testable(&frame)?;
-        check_unmarked(&frame, (&counts, left_out), watched.filter(|_| saturated == Saturated::LeftOut))?;
+        check_fair(&watch, saturated)?;
     }
+    let (counts, left_out) = watch.seen();
     let is_fair = |marks: &Marks| marks.beyond_model + if left_out { marks.saturated } else { 0 } == 0;
     if !is_fair(&counts[0]) {
         portrait.iter_mut().for_each(Portrait::forget_predictions);
@@ -147,6 +147,29 @@ fn measure_all(
         report.check = Some(Verdict::of(regions, level, &frame.name, report.unpredicted.as_deref())?);
     }
     Ok((report, portrait))
+}
+
+/// The sums of a frame that is to be checked and that nobody has to be waited for: what can be checked is known before anything is worked
+/// out; none of others.
+fn at_hand(
+    watch: &mut Watch<'_>,
+    regions: &[Region],
+    (saturated, levels): (Saturated, &Levels),
+    is_checked: bool,
+) -> Result<Option<Vec<Tally>>> {
+    if !is_checked || watch.may_wait() {
+        return Ok(None);
+    }
+    let found = tallies(watch, regions, levels)?;
+    check_fair(watch, saturated)?;
+    Ok(Some(found))
+}
+
+/// Makes sure that a frame all of whose rows were seen can be checked.
+fn check_fair(watch: &Watch<'_>, saturated: Saturated) -> Result<()> {
+    let frame = watch.header();
+    check_testable(frame)?;
+    check_unmarked(frame, watch.marks(), watch.untold().filter(|_| saturated == Saturated::LeftOut))
 }
 
 /// Makes sure that no pixel was left out for its value, or should be: `untold` says how many, where nothing marks which.

@@ -175,6 +175,11 @@ impl<'a> Watch<'a> {
         untold(self.source.header(), self.source.comes_with_layer())
     }
 
+    /// Marked pixels of each region so far, and whether saturated ones are left out.
+    pub fn marks(&self) -> (&[Marks], bool) {
+        (&self.counts, self.source.left_out & SATURATED != 0)
+    }
+
     /// Marked pixels of each region, and whether saturated ones were left out.
     pub fn seen(self) -> (Vec<Marks>, bool) {
         (self.counts, self.source.left_out & SATURATED != 0)
