@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
 use crate::support;
-use cyanometer::analysis::statistics::check::Verdict;
+use cyanometer::analysis::statistics::Verdict;
 use cyanometer::analysis::statistics::{Laws, Region, RegionReport, Saturated, measure};
 use cyanometer::color::{Space, White};
 use cyanometer::metadata::Scene;

@@ -413,6 +413,56 @@ fn drifting(size: [usize; 2], electrons: [f32; 3], rows: f64) -> MemoryFrame {
     frame
 }
 
+/// Of two amplifiers by columns red lies behind the first, blue behind the second and green behind both, by halves: what is predicted of electrons and
+/// codes is that, not of three planes each of which lies behind both. Numbers of red and blue by hand, of green by their mixture.
+#[test]
+fn stages_before_demosaicking_are_those_of_the_plane() {
+    let taps = Taps {
+        layout: TapLayout::Columns,
+        gain: vec![1.0, 1.02],
+        offset_e: vec![0.0, 8.0],
+        read_noise_e: vec![4.0, 12.0],
+    };
+    let mut camera = sensor();
+    camera.readout = Some(ReadOut {
+        width: 64,
+        height: 48,
+        cfa: CfaPattern::Rggb.into(),
+        full_well_e: 15_000.0,
+        dark_current_na_per_cm2: None,
+        dark_current_e_per_s: Some(0.0),
+        dcnu: 0.0,
+        prnu: 0.002,
+        read_noise_e: 5.0,
+        bits: 12,
+        bias_adu: 120.0,
+        adu_per_e: 0.25,
+        taps: Some(taps),
+        ..camera.readout.unwrap()
+    });
+    let setup = CameraSetup { method: Method::Bilinear, ..CameraSetup::new(camera, support::EXPOSURE) };
+    let stages = Predictor::new(PredictorSettings::of(setup)).unwrap().predict([1000.0; 3]).unwrap().stages;
+    // Shot noise, that of the sensitivities, which scatters by 1 + prnu², and read noise.
+    let variance = |gain: f64, read_noise_e: f64| {
+        (0.25 * gain).powi(2) * (1000.0 + 4.0 + 0.004 + read_noise_e * read_noise_e) + 1.0 / 12.0
+    };
+    let (red, blue) = ((120.0 + 250.0, variance(1.0, 4.0)), (120.0 + 0.25 * 1.02 * 1008.0, variance(1.02, 12.0)));
+    let half = f64::midpoint(red.0, blue.0);
+    let green = (half, f64::midpoint(red.1, blue.1) + (blue.0 - half).powi(2));
+    assert_eq!(stages[1].channels, ["R", "G", "B"]);
+    for (class, (mean, variance)) in [red, green, blue].into_iter().enumerate() {
+        assert!((stages[1].mean[class] - mean).abs() < 1e-6, "{class}: {} {mean}", stages[1].mean[class]);
+        assert!((stages[1].std[class] / variance.sqrt() - 1.0).abs() < 1e-6, "{class}: {}", stages[1].std[class]);
+    }
+    assert_eq!(stages[1].covariance[0][2], 0.0, "red and blue are other photosites");
+    assert!((stages[0].std[0].powi(2) - 1020.004).abs() < 1e-6 && (stages[0].std[2].powi(2) - 1148.004).abs() < 1e-6);
+    // The mean of a channel is what it was, black of the code range taken off.
+    let demosaicked = &stages[2];
+    assert!(
+        [red, green, blue].iter().zip(demosaicked.mean).all(|((mean, _), found)| (mean - 120.0 - found).abs() < 1e-6)
+    );
+}
+
 /// What each tap makes of a charge: by the sensor's own numbers, and by those of the tap; and read noise in proportion.
 #[test]
 fn taps_have_their_own_numbers() {

@@ -203,7 +203,7 @@ fn statistics_over_frames_are_as_predicted() {
             let of = |frames: &Vec<MemoryFrame>| {
                 let Ok((report, _)) = over_frames(frames, Some(1e-9)) else { return Vec::new() };
                 let tests = report.regions[0].tests.iter();
-                tests.filter_map(|test| test.z.map(|z| (format!("{:?}", test.subject), z))).collect()
+                tests.filter_map(|test| test.deviate().map(|z| (format!("{:?}", test.subject), z))).collect()
             };
             (seed, chain(&camera, frames).iter().map(of).collect())
         })
@@ -500,7 +500,7 @@ impl Honest {
         let camera = coarse(self.set, self.electrons, self.size, seed);
         let mut frames: Vec<MemoryFrame> = (0..self.frames).map(|frame| self.frame(&camera, frame)).collect();
         let of = |test: &cyanometer::analysis::statistics::check::Test| {
-            (format!("{:?}", test.subject), test.z.unwrap_or(0.0), test.p)
+            (format!("{:?}", test.subject), test.deviate().unwrap_or(0.0), test.p)
         };
         if let [one] = &mut frames[..] {
             let report = measure(one, &[], Saturated::Kept, Equations::Exact, Some(0.05)).unwrap();
@@ -552,6 +552,47 @@ fn honest_frames_far_from_normal_pass() {
         }
     }
     assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// Frames nearly all of whose samples are the top code, few of them far below: whether a class has such a sample in any frame is chance, and no
+/// variance of few tells otherwise. Beside tests by bounds no deviate is shown, which would be taken for one of a normal law.
+#[test]
+fn frames_that_are_nearly_full_pass() {
+    let set = |readout: &mut ReadOut| {
+        plain(readout, [5.0, 0.1, 0.005, 2.0, 4.0]);
+        (readout.full_well_e, readout.bias_adu) = (5000.0, 120.0);
+    };
+    let seeds = misses::trials(12);
+    let mut ends = [0; 2];
+    for level in [1080.0, 1100.0, 1115.0, 1130.0, 1145.0] {
+        let smallest = (0..seeds).into_par_iter().map(|seed| {
+            let camera = coarse(set, [level; 3], [32, 24], 40_000 + seed);
+            let mut frames: Vec<MemoryFrame> = (0..12).map(|frame| camera.plane(camera.electrons, frame)).collect();
+            let (report, _) = over_frames(&frames, Some(1e-4)).unwrap();
+            let region = &report.regions[0];
+            let of = |name: &str, subject: &str| {
+                let mut own = region.tests.iter().filter(|test| test.channels == [name]);
+                own.any(|test| format!("{:?}", test.subject) == subject && test.z.is_some())
+            };
+            for class in &region.classes {
+                assert_eq!(class.z_mean.is_some(), of(&class.name, "Mean"), "{class:?}");
+                assert_eq!(class.z_temporal_std.is_some(), of(&class.name, "TemporalVariance"), "{class:?}");
+            }
+            let one = measure(&mut frames[0], &[], Saturated::Kept, Equations::Exact, Some(1e-4)).unwrap();
+            let one = &one.regions[0];
+            let is_known = |name: &str| one.tests.iter().any(|test| test.channels == [name] && test.z.is_some());
+            let shown: Vec<bool> = one.classes.iter().map(|class| class.z_mean.is_some()).collect();
+            let known: Vec<bool> = one.classes.iter().map(|class| is_known(&class.name)).collect();
+            assert_eq!(shown, known);
+            (region.tests.iter().map(|test| test.p).fold(1.0, f64::min), region.tests.len(), known[0])
+        });
+        let smallest: Vec<(f64, usize, bool)> = smallest.collect();
+        for (p, tests, known) in smallest {
+            assert!(of_smallest(p, tests) > 1e-4, "{level}: {p} of {tests}");
+            ends[usize::from(known)] += 1;
+        }
+    }
+    assert!(ends.iter().all(|count| *count > 0), "{ends:?}: one of both is not seen");
 }
 
 /// Frames whose means are all the same were not drawn one by one; of two frames of few electrons they may be.

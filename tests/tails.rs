@@ -348,7 +348,7 @@ fn moments_are_as_predicted_at_every_stage() {
             let scene = scene([260, 240], levels.map(|level| level as f32), random_sensor(&mut random));
             let of = |frame: &MemoryFrame| {
                 let tests = told(frame).map(|region| region.tests).unwrap_or_default();
-                tests.iter().filter_map(|test| test.z.map(|z| (format!("{:?}", test.subject), z))).collect()
+                tests.iter().filter_map(|test| test.deviate().map(|z| (format!("{:?}", test.subject), z))).collect()
             };
             (seed, chain(&scene, seed).iter().map(of).collect())
         })
@@ -399,7 +399,7 @@ fn dark_frames_of_less_than_a_code_are_predicted() {
             let less = less_darks(&plane, &scene, seed, 7);
             let region = told(&less)
                 .unwrap_or_else(|| panic!("{seed}: {}", of_frame(&less.header, Equations::Exact).unwrap_err()));
-            region.tests.iter().filter_map(|test| test.z.map(|z| (format!("{:?}", test.subject), z))).collect()
+            region.tests.iter().filter_map(|test| test.deviate().map(|z| (format!("{:?}", test.subject), z))).collect()
         })
         .collect();
     for subject in ["Mean", "Variance"] {

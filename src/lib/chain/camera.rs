@@ -95,6 +95,19 @@ impl CameraSetup {
         FrameHeader { name, geometry, metadata }
     }
 
+    /// The head of the plane that the filter array leaves of three which several amplifiers read: each class lies behind some of them alone, so that its
+    /// photosites are not those of its plane. Other heads stay.
+    ///
+    /// # Errors
+    ///
+    /// Those of the mosaic.
+    pub(super) fn behind_array(&self, head: &FrameHeader) -> Result<FrameHeader> {
+        if head.taps().is_none() || head.metadata.cfa.is_some() {
+            return Ok(head.clone());
+        }
+        Ok(Mosaic::new(head, self.pattern)?.header().clone())
+    }
+
     /// The stages that a frame of expected electrons goes through.
     ///
     /// # Errors

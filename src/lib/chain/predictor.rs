@@ -7,6 +7,7 @@ use super::camera::CameraSetup;
 use super::causes::{Causes, fixed_of};
 use super::predicted::{CauseVariance, ChainPrediction, ChainStage, NoiseDeltaE, PhaseCovariance, StagePrediction};
 use crate::camera::sensor::Sensor;
+use crate::cfa::Class;
 use crate::color::Space;
 use crate::color::difference::DELTA_E_PER_JND;
 use crate::error::{Error, Result};
@@ -122,11 +123,13 @@ impl Predictor {
         let expected =
             FrameHeader { name: "the prediction".into(), ..camera.planes(size, Scene::uniform("formula", [0.0; 3])) };
         let stages = camera.stages(&expected)?;
-        let mut heads = vec![
-            (ChainStage::Electrons, stages.add_noise.header().clone()),
-            (ChainStage::Adu, stages.digitize.header().clone()),
+        let of_sites = [
+            Some((ChainStage::Electrons, stages.add_noise.header())),
+            Some((ChainStage::Adu, stages.digitize.header())),
+            stages.correct.as_ref().map(|correct| (ChainStage::DarkSubtracted, correct.header())),
         ];
-        heads.extend(stages.correct.as_ref().map(|correct| (ChainStage::DarkSubtracted, correct.header().clone())));
+        let of_sites = of_sites.into_iter().flatten().map(|(stage, head)| Ok((stage, camera.behind_array(head)?)));
+        let mut heads = of_sites.collect::<Result<Vec<_>>>()?;
         heads.push((ChainStage::Demosaicked, stages.demosaic.header().clone()));
         if let Some(color) = &settings.color {
             for (stage, space) in [(ChainStage::Xyz, Space::Xyz), (ChainStage::Lab, Space::Lab)] {
@@ -322,7 +325,10 @@ impl PredictorSettings {
         StagePrediction {
             stage,
             unit: metadata.unit.clone(),
-            channels: (0..3).map(|index| head.channel_name(index).to_owned()).collect(),
+            channels: match metadata.cfa {
+                Some(_) => Class::ALL.map(|class| class.letter().to_owned()).to_vec(),
+                None => (0..3).map(|index| head.channel_name(index).to_owned()).collect(),
+            },
             void: match prediction {
                 FramePrediction::Pixels(mixture) => mixture.void,
                 FramePrediction::Planes(_) | FramePrediction::Groups(_) | FramePrediction::Tapped(_) => None,
@@ -358,13 +364,18 @@ impl PredictorSettings {
             FramePrediction::Groups(groups) => {
                 let classes = pooled(groups);
                 let mean = classes.map(|class| class.moments.mean);
-                // Amplifiers move the classes together.
+                // Amplifiers move the classes together, but for those of a plane, which are other photosites.
+                let is_plane = groups.iter().any(|group| group.counts[0] != group.counts[1]);
                 let n: f64 = groups.iter().map(|group| group.counts[0]).sum();
                 let off = |group: &Group, i: usize| group.sites[i].moments.mean - mean[i];
                 let between = |i: usize, j: usize| {
                     groups.iter().map(|group| group.counts[0] * off(group, i) * off(group, j)).sum::<f64>() / n
                 };
-                let covariance = |i: usize, j: usize| if i == j { classes[i].moments.variance } else { between(i, j) };
+                let covariance = |i: usize, j: usize| match i == j {
+                    true => classes[i].moments.variance,
+                    false if is_plane => 0.0,
+                    false => between(i, j),
+                };
                 (mean, Matrix3::from_fn(covariance))
             }
             FramePrediction::Pixels(mixture) if self.equations == Equations::Paper => {

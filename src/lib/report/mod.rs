@@ -30,8 +30,8 @@ pub use raw_outputs::RawOutputs;
 pub use sequence::{Findings, Reports};
 pub use trade_off::trade_off;
 
-use crate::analysis::statistics::check::{Subject, Test, Verdict};
-use crate::analysis::statistics::{ChannelReport, RegionReport, Report};
+use crate::analysis::statistics::check::{Subject, Test};
+use crate::analysis::statistics::{ChannelReport, RegionReport, Report, Verdict};
 use crate::error::{Error, Result};
 use crate::formats::places::named;
 use crate::formats::yaml_writer;

@@ -1,6 +1,5 @@
 //! Is what was measured what was predicted? Tests of means, variances and correlations.
 
-use crate::error::{Error, Result};
 use crate::numerics::significance;
 use crate::propagation::covariance::PAIRS;
 use crate::propagation::sampling::Sampling;
@@ -54,92 +53,33 @@ pub struct Test {
     pub measured: f64,
     /// What is expected of a sample of this size.
     pub expected: f64,
-    /// Deviation over its standard error.
+    /// Deviation over its standard error, where it follows a law.
     pub z: Option<f64>,
+    /// The same where no law is known but a bound, as of Chebyshev: it is no measure of chance.
+    #[serde(skip)]
+    pub bounded: Option<f64>,
     /// Effective degrees of freedom of a variance or a correlation.
     pub degrees_of_freedom: Option<f64>,
     /// Probability of a deviation at least as large by chance.
     pub p: f64,
 }
 
-/// The verdict on all tests together.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Verdict {
-    /// Chance of a false alarm that is accepted.
-    pub level: f64,
-    /// Number of tests.
-    pub tests: usize,
-    /// Smallest probability.
-    pub smallest_p: f64,
-    /// The same, corrected for the number of tests: 1 − (1 − p)ⁿ.
-    pub corrected_p: f64,
-    /// Whether it is no smaller than the level.
-    pub passed: bool,
-    /// Whether no sample should scatter: values were compared with values, and no law of noise was tested.
-    #[serde(skip_serializing_if = "is_scattered")]
-    pub is_noiseless: bool,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands out references")]
-fn is_scattered(is_noiseless: &bool) -> bool {
-    !*is_noiseless
-}
-
-impl Verdict {
-    /// The verdict on the regions of a frame, each its tests and the pixels that are not finite; `why` says what keeps
-    /// predictions from being made, where something does.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Data`] where there is nothing to test.
-    pub fn of<'a>(
-        regions: impl Iterator<Item = (&'a [Test], u64)> + Clone,
-        level: f64,
-        frame: &str,
-        why: Option<&str>,
-    ) -> Result<Self> {
-        if regions.clone().next().is_none() || regions.clone().any(|(tests, _)| tests.is_empty()) {
-            let why = why.map_or(String::new(), |why| format!("; here {why}"));
-            return Err(Error::Data(format!(
-                "{frame}: nothing can be checked: a prediction needs a uniform scene and metadata that say what was done \
-                 to it, up to XYZ, xyY or L*a*b*{why}"
-            )));
-        }
-        if let Some((_, not_finite)) = regions.clone().find(|(_, not_finite)| *not_finite > 0) {
-            return Err(Error::Data(format!(
-                "{frame}: nothing can be checked: {not_finite} pixels are NaN or infinite"
-            )));
-        }
-        let all = regions.clone().flat_map(|(tests, _)| tests);
-        let (tests, smallest_p) = all.fold((0, 1.0_f64), |(count, least), test| (count + 1, least.min(test.p)));
-        let corrected_p = significance::of_smallest(smallest_p, tests);
-        let is_noiseless =
-            regions.flat_map(|(tests, _)| tests).all(|test| test.subject == Subject::Deviation && test.expected == 0.0);
-        Ok(Self { level, tests, smallest_p, corrected_p, passed: corrected_p >= level, is_noiseless })
-    }
-
-    /// Nothing where the check is passed.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Data`] where it is not.
-    pub fn judge(self, frame: &str) -> Result<()> {
-        if self.passed {
-            return Ok(());
-        }
-        Err(Error::Data(format!(
-            "{frame}: it is not as predicted: the least likely of {} statistics has p = {:.2e}, corrected for their number \
-             {:.2e}, below the level {:e}",
-            self.tests, self.smallest_p, self.corrected_p, self.level
-        )))
-    }
-}
-
 impl Test {
     /// Whether its law is known to numbers. Where it is not nothing was tested: no number is no alarm.
     pub(super) fn is_sound(&self) -> bool {
-        let numbers = [Some(self.measured), Some(self.expected), self.z, self.degrees_of_freedom, Some(self.p)];
+        let numbers = [Some(self.measured), Some(self.expected), self.deviate(), self.degrees_of_freedom, Some(self.p)];
         numbers.into_iter().flatten().all(f64::is_finite)
+    }
+
+    /// Deviation over its standard error, whatever is known of its law.
+    pub fn deviate(&self) -> Option<f64> {
+        self.z.or(self.bounded)
+    }
+
+    /// The same with a deviate that follows a law, or none.
+    pub(super) fn with(self, deviate: f64, has_law: bool) -> Self {
+        let of = |wanted: bool| (has_law == wanted).then_some(deviate);
+        Self { z: of(true), bounded: of(false), ..self }
     }
 }
 
@@ -226,17 +166,22 @@ impl Expected {
 
     /// Whether so few photosites make up the variance of a channel that it is not like χ², in a way that nothing is known of.
     fn is_heavy(&self, channel: usize) -> bool {
+        self.is_heavy_in(channel, 1.0)
+    }
+
+    /// The same of as many samples in so many frames.
+    pub(super) fn is_heavy_in(&self, channel: usize, frames: f64) -> bool {
         let classes = if self.is_plane { channel..channel + 1 } else { 0..3 };
         let of_class = |class: usize| {
             let kurtosis = self.site_kurtosis[class];
-            kurtosis > 1.0 && self.sampling.count < HEAVY * kurtosis && !self.knows_tails(class)
+            kurtosis > 1.0 && self.sampling.count * frames < HEAVY * kurtosis && !self.knows_tails(class)
         };
         classes.into_iter().any(of_class)
     }
 
     /// Excess kurtosis of the sum of products of two channels whose photosites are independent, at most: ((κ + 3)(κ′ + 3) − 9)⁄n
     /// with κ, κ′ those of photosites. None that matters where they hardly have any.
-    fn product_kurtosis(&self, channels: [usize; 2]) -> f64 {
+    pub(super) fn product_kurtosis(&self, channels: [usize; 2]) -> f64 {
         let most = |channel: usize| {
             let (classes, count) = self.classes_of(channel);
             (classes.map(|class| self.site_kurtosis[class]).fold(0.0, f64::max), count)
@@ -251,7 +196,7 @@ impl Expected {
     }
 
     /// Excess kurtosis of the mean of a channel of photosites that are unlike each other, at most.
-    fn mean_kurtosis(&self, channel: usize) -> f64 {
+    pub(super) fn mean_kurtosis(&self, channel: usize) -> f64 {
         let (classes, count) = self.classes_of(channel);
         classes.map(|k| self.site_kurtosis[k] / count).fold(0.0, f64::max)
     }
@@ -310,7 +255,7 @@ const HEAVY: f64 = 1000.0;
 
 /// Excess kurtosis beyond which a statistic of photosites that are unlike each other follows no law that its third cumulant tells:
 /// at 4 standard deviations 0.05 makes tails half as large again.
-const FREE: f64 = 0.05;
+pub(super) const FREE: f64 = 0.05;
 
 /// Tests the channels `0..count` and their correlations.
 pub(super) fn tests(measured: &Measured<'_>, expected: &Expected) -> Vec<Test> {
@@ -361,21 +306,24 @@ fn mean(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
     let error = expected.sampling.mean_covariance[(i, i)].sqrt();
     let z = (measured.mean[i] - expected.mean[i]) / error;
     let skewness = expected.mean_skewness(i);
-    Test {
+    let has_law = !expected.has_tails() || expected.mean_kurtosis(i) <= FREE;
+    let test = Test {
         subject: Subject::Mean,
         channels: vec![measured.names[i].clone()],
         measured: measured.mean[i],
         expected: expected.mean[i],
-        z: Some(z),
+        z: None,
+        bounded: None,
         degrees_of_freedom: None,
-        p: if expected.has_tails() && expected.mean_kurtosis(i) > FREE {
+        p: if !has_law {
             of_any_law(z)
         } else if expected.is_plane {
             significance::of_skewed(z, skewness)
         } else {
             significance::of_skewed(z, skewness).max(significance::of_skewed(z, -skewness))
         },
-    }
+    };
+    test.with(z, has_law)
 }
 
 /// The bound of Chebyshev, 1/z².
@@ -393,17 +341,18 @@ pub(super) fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Tes
     let freedom = 2.0 * expected * expected / scatter;
     let found = measured.covariance[(i, i)];
     let z = (found - expected) / scatter.sqrt();
-    Test {
+    let has_law = freedom >= FEW
+        && (!law.is_plane || law.site_kurtosis[i] >= FLAT)
+        && (!law.has_tails() || law.variance_kurtosis(i) <= FREE);
+    let test = Test {
         subject: Subject::Variance,
         channels: vec![measured.names[i].clone()],
         measured: found,
         expected,
-        z: Some(z),
+        z: None,
+        bounded: None,
         degrees_of_freedom: Some(freedom),
-        p: if freedom < FEW
-            || (law.is_plane && law.site_kurtosis[i] < FLAT)
-            || (law.has_tails() && law.variance_kurtosis(i) > FREE)
-        {
+        p: if !has_law {
             of_any_law(z)
         } else if law.has_tails() && !law.is_plane {
             let skewness = law
@@ -416,7 +365,8 @@ pub(super) fn variance(measured: &Measured<'_>, law: &Expected, i: usize) -> Tes
         } else {
             significance::of_chi_square(freedom * found / expected, freedom)
         },
-    }
+    };
+    test.with(z, has_law)
 }
 
 /// artanh r about artanh ρ + ρ/2ν, with variance 1/(ν − 2), as of ν + 1 independent normal pairs \[Fisher1921].
@@ -451,6 +401,7 @@ pub(super) fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: u
         measured: found,
         expected,
         z: Some(z),
+        bounded: None,
         degrees_of_freedom: Some(freedom),
         p: significance::of_normal(z),
     })
@@ -458,12 +409,12 @@ pub(super) fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: u
 
 /// The same where few products of samples make up the covariance, as where two that are far off meet by chance: Markov's inequality
 /// of the second and the fourth power, P(|z| ≥ t) ≤ min(1/t², (3 + κ)/t⁴), of z = √ν (r − ρ)/(1 − ρ²), whose variance is 1.
-fn of_few_products(test: Test, kurtosis: f64) -> Test {
+pub(super) fn of_few_products(test: Test, kurtosis: f64) -> Test {
     let (found, expected) = (test.measured, test.expected);
     let freedom = test.degrees_of_freedom.unwrap_or_default();
     let z = freedom.sqrt() * (found - expected) / (1.0 - expected * expected);
     let bound = of_any_law(z).min((3.0 + kurtosis) / z.powi(4));
-    Test { z: Some(z), p: test.p.max(bound), ..test }
+    Test { p: test.p.max(bound), ..test }.with(z, false)
 }
 
 /// Where hardly a sample should deviate: P(mean square deviation ≥ d²) ≤ E d²/d² by Markov's inequality. What single
@@ -482,6 +433,7 @@ fn deviation(measured: &Measured<'_>, expected: &Expected, i: usize) -> Test {
         measured: found.sqrt(),
         expected: population.sqrt(),
         z: None,
+        bounded: None,
         degrees_of_freedom: None,
         p,
     }

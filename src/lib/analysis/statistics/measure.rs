@@ -1,13 +1,13 @@
 //! Reads a frame and measures its regions.
 
 use super::assessment::Assessment;
-use super::check::Verdict;
 use super::laws::{Known, Laws, Samplings};
 use super::levels::Levels;
 use super::portrait::{Portrait, sitting};
 use super::region::Region;
-use super::report::{RegionReport, Report, coverage};
+use super::report::{Report, coverage};
 use super::tally::{Tally, tallies};
+use super::verdict::Verdict;
 use super::watch::{Marks, Saturated, Watch};
 use crate::error::{Error, Result};
 use crate::metadata::FrameHeader;
@@ -130,7 +130,7 @@ fn measure_all(
         let prediction = prediction.as_ref().ok().filter(|_| is_fair(marks));
         let assessment = Assessment::new(tally, &frame, *region, prediction, sampling);
         let tests = if level.is_some() { assessment.tests() } else { Vec::new() };
-        RegionReport { tests, ..assessment.report(&frame, *region, &levels).with_marks(*marks, left_out) }
+        assessment.report(&frame, *region, &levels).with_marks(*marks, left_out).tested(tests)
     };
     let regions = regions.iter().zip(&tallies).zip(&counts).enumerate().map(report).collect();
     let unpredicted = match &of_regions {

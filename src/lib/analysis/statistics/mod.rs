@@ -5,6 +5,7 @@
 
 mod assessment;
 pub mod check;
+mod deviates;
 mod expectation;
 mod grids;
 mod groups;
@@ -20,6 +21,7 @@ mod repeated_check;
 mod repeated_report;
 mod report;
 mod tally;
+mod verdict;
 mod watch;
 
 pub use laws::Laws;
@@ -28,4 +30,5 @@ pub use over_frames::{OverFrames, OverFramesSettings};
 pub use region::Region;
 pub use repeated_report::{RepeatedChannel, RepeatedRegion, RepeatedReport};
 pub use report::{ChannelReport, RegionReport, Report};
+pub use verdict::Verdict;
 pub use watch::{MarkedRows, Saturated};

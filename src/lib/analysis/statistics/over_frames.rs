@@ -11,7 +11,6 @@
 //! S as in the sample variance of a frame; what is predicted beside them is what is expected of that region.
 
 use super::assessment::Assessment;
-use super::check::Verdict;
 use super::laws::Samplings;
 use super::levels::Levels;
 use super::measure::{check_testable, unfair};
@@ -19,6 +18,7 @@ use super::region::Region;
 use super::repeated_report::{RepeatedChannel, RepeatedRegion, RepeatedReport};
 use super::report::{ChannelReport, RegionReport, coverage};
 use super::tally::{Tally, tallies};
+use super::verdict::Verdict;
 use super::watch::{Saturated, Watch};
 use crate::error::{Error, Result};
 use crate::metadata::{AverageRecord, ExposuresRecord, FrameHeader};
@@ -344,7 +344,7 @@ impl Made {
         };
         let channels = means.channels.iter().zip(&variances.channels).enumerate();
         let classes = means.classes.iter().zip(&variances.classes).enumerate();
-        RepeatedRegion {
+        let region = RepeatedRegion {
             region: means.region,
             count: means.count,
             left_out: means.not_finite,
@@ -364,8 +364,9 @@ impl Made {
                 variances.predicted_covariance.as_ref(),
             ),
             patch_mean_std: means.patch_mean_std.clone().filter(|_| self.is_known),
-            tests,
-        }
+            tests: Vec::new(),
+        };
+        region.tested(tests)
     }
 
     fn channel(

@@ -1,7 +1,9 @@
 //! What is said of several frames of one scene, their regions and channels.
 
-use super::check::{Test, Verdict};
+use super::check::{Subject, Test};
+use super::deviates::{Shown, forget_deviates};
 use super::region::Region;
+use super::verdict::Verdict;
 use crate::metadata::Coverage;
 use crate::units::QuantityKind;
 use serde::Serialize;
@@ -57,6 +59,24 @@ pub struct RepeatedRegion {
     /// Tests of the predictions, where they were asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tests: Vec<Test>,
+}
+
+impl RepeatedRegion {
+    /// The same as tests of it found it, where there are any.
+    #[must_use]
+    pub(super) fn tested(mut self, tests: Vec<Test>) -> Self {
+        fn shown(channels: &mut [RepeatedChannel], of: fn(&mut RepeatedChannel) -> &mut Option<f64>) -> Shown<'_> {
+            channels.iter_mut().map(|channel| (channel.name.clone(), of(channel))).collect()
+        }
+        let mut forget = |subject: Subject, of: fn(&mut RepeatedChannel) -> &mut Option<f64>| {
+            let both = [&mut self.channels, &mut self.classes].map(|channels| shown(channels, of));
+            forget_deviates(&tests, subject, both);
+        };
+        forget(Subject::Mean, |channel| &mut channel.z_mean);
+        forget(Subject::TemporalVariance, |channel| &mut channel.z_temporal_std);
+        forget(Subject::VarianceOfMeans, |channel| &mut channel.z_std_of_means);
+        Self { tests, ..self }
+    }
 }
 
 /// Statistics of one channel, or of one class of a CFA plane.

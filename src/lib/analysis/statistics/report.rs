@@ -1,7 +1,9 @@
 //! What is said of a frame, its regions and their channels.
 
-use super::check::{Test, Verdict};
+use super::check::{Subject, Test};
+use super::deviates::{Shown, forget_deviates};
 use super::region::Region;
+use super::verdict::Verdict;
 use super::watch::Marks;
 use crate::metadata::{Coverage, FrameHeader};
 use crate::units::QuantityKind;
@@ -84,6 +86,21 @@ impl RegionReport {
         let Marks { saturated, defective, corrected, beyond_model, left_out } = marks;
         let not_finite = self.not_finite.saturating_sub(left_out);
         Self { not_finite, saturated, defective, corrected, beyond_model, leaves_saturated_out, ..self }
+    }
+
+    /// The same as tests of it found it, where there are any.
+    #[must_use]
+    pub(super) fn tested(mut self, tests: Vec<Test>) -> Self {
+        fn shown(channels: &mut [ChannelReport], of: fn(&mut ChannelReport) -> &mut Option<f64>) -> Shown<'_> {
+            channels.iter_mut().map(|channel| (channel.name.clone(), of(channel))).collect()
+        }
+        let mut forget = |subject: Subject, of: fn(&mut ChannelReport) -> &mut Option<f64>| {
+            let both = [&mut self.channels, &mut self.classes].map(|channels| shown(channels, of));
+            forget_deviates(&tests, subject, both);
+        };
+        forget(Subject::Mean, |channel| &mut channel.z_mean);
+        forget(Subject::Variance, |channel| &mut channel.z_std);
+        Self { tests, ..self }
     }
 
     /// The same with nothing predicted: what is left where pixels are left out by their values follows no formula.
