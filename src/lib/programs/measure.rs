@@ -2,7 +2,6 @@
 
 use crate::cli;
 use crate::error::Result;
-use crate::formats::output::is_stdout;
 use crate::formats::plots;
 use crate::report::{self, Findings, ReportFormat};
 use crate::requests::independence::check_copies;
@@ -62,10 +61,6 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let reports = Output { makes: Makes::Reports, ..Output::default() };
     let findings = Findings::new(format, frames.inputs.len() > 1, arguments.output.clone());
     let measured = session.each_frame::<Arguments>(frames, &reports, |turn| measure(arguments, turn, &findings));
-    // Reports of several inputs stand without those that failed; an error in the one that there is leaves no file.
-    if measured.is_err() && frames.inputs.len() <= 1 && !is_stdout(arguments.output.as_deref()) {
-        return measured;
-    }
     measured.and(findings.end())
 }
 
