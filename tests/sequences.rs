@@ -320,6 +320,18 @@ fn what_is_no_frame_is_refused() {
         assert!(complaint.contains(wanted), "{line}: {complaint}");
     }
     assert!(shop.path("m-scene.exr").exists());
+    // Bytes behind a frame that are none leave no named file, from a pipe either, nor does a failure of the program before.
+    let with_junk = [frame.as_slice(), b"junk"].concat();
+    for (line, name) in [
+        ("add-noise -o left.exr", "left.exr"),
+        ("mosaic --format tiff -o left.tiff", "left.tiff"),
+        ("preview -o left.png", "left.png"),
+        ("preview --caption -o left2.png", "left2.png"),
+    ] {
+        let output = shop.attempt(line, &with_junk);
+        assert!(output.status.code() == Some(BAD_DATA) && said(&output).contains(junk), "{line}: {}", said(&output));
+        assert!(!shop.path(name).exists() && !shop.path(&format!("{name}.yaml")).exists(), "{line}");
+    }
     // Frames of a file, and those of several files in one stream.
     assert_eq!(lines(&shop.run("measure two.exr --output-format json", &[])).len(), 2);
     let stream = shop.run("mosaic two.exr scene.exr", &[]);

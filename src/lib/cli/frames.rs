@@ -158,6 +158,7 @@ impl Session {
         let path: Option<&Path> = job.input.as_deref();
         let sequence = if exposures.len() > 1 { Sequence::of_repeatable(path)? } else { Sequence::of(path) };
         let sequence = if input.inputs.len() > 1 { sequence.among_others() } else { sequence };
+        let sequence = if output.is_stream() { sequence } else { sequence.settled() };
         let input = input.only(path, Some(sequence.clone()));
         let exposed = exposures.len() as u64;
         let mut output = Output { output: job.frame.clone(), ..output.clone() };

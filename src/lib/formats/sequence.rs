@@ -64,6 +64,8 @@ struct State {
     /// The frame that was taken last, where it can be taken again.
     last: Option<(File, u64)>,
     is_of_several_files: bool,
+    /// Whether what comes behind a frame is looked at before the frame counts as read.
+    is_settled: bool,
 }
 
 enum At {
@@ -91,13 +93,29 @@ impl Sequence {
     /// The frames of a file, or of the standard input for `-` or none; nothing is opened yet.
     pub fn of(path: Option<&Path>) -> Self {
         let path = named(path).map(Path::to_owned);
-        let state = State { path, at: At::Start, taken: 0, to_come: 0, last: None, is_of_several_files: false };
+        let state = State {
+            path,
+            at: At::Start,
+            taken: 0,
+            to_come: 0,
+            last: None,
+            is_of_several_files: false,
+            is_settled: false,
+        };
         Self(Arc::new(Mutex::new(state)))
     }
 
     /// The same of one of several files: metadata of its frames tell which.
     pub fn among_others(self) -> Self {
         self.state().is_of_several_files = true;
+        self
+    }
+
+    /// The same whose frames go into named files, which get their names once no bytes but frames come behind: these are waited for, unless
+    /// the frame says itself that others follow.
+    #[must_use]
+    pub fn settled(self) -> Self {
+        self.state().is_settled = true;
         self
     }
 
@@ -208,9 +226,22 @@ impl Sequence {
         Ok(Next { place, path: state.path.clone(), number, is_of_several_files: state.is_of_several_files })
     }
 
-    /// Goes on behind a frame that was read to its end.
-    pub(super) fn go_on(&self, rest: Rest) {
-        self.state().at = At::Behind(rest);
+    /// Goes on behind a frame of such a name that was read to its end.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::has_more`], as far as it is known what comes.
+    pub(super) fn go_on(&self, mut rest: Rest, name: &str) -> Result<()> {
+        // What a file holds is known now; what a stream brings may take its time.
+        if !matches!(rest, Rest::Pipe(_)) {
+            rest.begins_frame(name)?;
+        }
+        let is_waited_for = {
+            let mut state = self.state();
+            state.at = At::Behind(rest);
+            state.is_settled && state.to_come == 0
+        };
+        if is_waited_for { self.has_more().map(drop) } else { Ok(()) }
     }
 }
 

@@ -30,8 +30,8 @@ const MOST: u64 = 8_000_000;
 /// Width of a panel, in standard deviations of what a photosite reads: 12 nodes leave 10⁻⁹ of a product of normal laws.
 const PANEL: f64 = 4.0;
 
-/// Panels over offsets are no narrower than this, in standard deviations of these.
-const LEAST_PANEL: f64 = 18.0 / 300.0;
+/// Where what changes with offsets does so over less than this of their standard deviation, nothing is said.
+const LEAST_SMOOTH: f64 = 0.006;
 
 /// The scale on which sensitivities stand for offsets: none is cut off at zero.
 const OFFSET: f64 = 0.01;
@@ -112,11 +112,15 @@ fn over_offsets(law: &Law, reading: &Reading, offsets_e: f64) -> Sums {
     // Patterns blur counts where they spread these by more.
     let pattern_e = if law.least_pattern_std() > 1.0 { spread_e[0].hypot(spread_e[1]) } else { 0.0 };
     let smooth = exposed.blur_e().hypot(pattern_e) / offsets_e;
+    if smooth < LEAST_SMOOTH {
+        effort::spend(u64::MAX);
+        return Sums::default();
+    }
     let places = if law.reaches_full_well() {
         let width = exposed.noise_e / offsets_e;
-        between(-REACH, (3.0 * smooth).clamp(LEAST_PANEL, 3.0), &exposed.knees_at_full(offsets_e, width))
+        between(-REACH, 3.0 * smooth.min(1.0), &exposed.knees_at_full(offsets_e, width))
     } else {
-        sensitivities(&Charge { rate: 1.0, shot: None, pattern: OFFSET }, OFFSET * smooth)
+        fine_sensitivities(&Charge { rate: 1.0, shot: None, pattern: OFFSET }, OFFSET * smooth)
             .into_iter()
             .map(|(place, weight)| ((place - 1.0) / OFFSET, weight))
             .collect()

@@ -6,7 +6,7 @@ use super::masters::{Dark, MOST_DARKS};
 use super::moments::Equations;
 use super::pattern::Shared;
 use super::photosite::Photosite;
-use super::unpredictable::{OFFSETS_TOO_LONG, Predicted, TOO_LONG, Unpredictable};
+use super::unpredictable::{OFFSETS_TOO_LONG, PATTERNS_TOO_LONG, Predicted, TOO_LONG, Unpredictable};
 use crate::camera::readout::ReadOut;
 use crate::metadata::AdcRecord;
 use crate::numerics::averages::Combine;
@@ -228,7 +228,7 @@ impl Photosite {
     pub fn causes(&self, expected_e: f64) -> Predicted<Budget> {
         let mut budget = self.told_apart(self.budget(expected_e), expected_e);
         if budget.iter().any(|variance| variance.is_nan()) {
-            return Err(Unpredictable::Beyond(if self.has_tails() { TOO_LONG } else { OFFSETS_TOO_LONG }));
+            return Err(Unpredictable::Beyond(self.why_too_long()));
         }
         let all: f64 = budget.iter().map(|variance| variance.abs()).sum();
         for cause in DIFFERENCES {
@@ -236,6 +236,15 @@ impl Photosite {
             *found = if found.abs() < ROUNDED_AWAY * all { 0.0 } else { *found };
         }
         Ok(budget)
+    }
+
+    /// Why what takes too long does.
+    pub(super) fn why_too_long(&self) -> &'static str {
+        match self.has_tails() {
+            true => TOO_LONG,
+            false if self.models().any(|model| model.offsets() > 0.0) => OFFSETS_TOO_LONG,
+            false => PATTERNS_TOO_LONG,
+        }
     }
 
     /// The same with what rounding does to the means of photosites as part of the fixed pattern, so that the causes of either kind add up

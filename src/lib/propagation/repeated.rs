@@ -24,7 +24,7 @@ use super::moments::{Equations, LineCovariance, Prediction};
 use super::photosite::Photosite;
 use super::reading::codes_of;
 use super::unlike::Temporal;
-use super::unpredictable::{Predicted, TOO_LONG, Unpredictable};
+use super::unpredictable::{Predicted, Unpredictable};
 use crate::metadata::{AdcRecord, AverageRecord, ExposuresRecord, FrameHeader};
 use crate::names::Named;
 use crate::numerics::averages::{CLIP, Combine, Kept};
@@ -233,7 +233,7 @@ impl Photosite {
         };
         let found = [0, 1, 2].map(|k| Temporal { lines: lines[k], ..self.temporal(k, expected_e[k], true) });
         let is_known = self.flat.is_some() || found.iter().all(|temporal| !temporal.variance.is_nan());
-        if is_known { Ok(found) } else { Err(Unpredictable::Beyond(TOO_LONG)) }
+        if is_known { Ok(found) } else { Err(Unpredictable::Beyond(self.why_too_long())) }
     }
 
     /// What an average of exposures keeps of samples of which one exposure has such moments.

@@ -425,12 +425,7 @@ impl FrameReader {
         match self.sequence.take() {
             Some(sequence) => {
                 self.pass_over(below, &mut Vec::new())?;
-                let mut rest = self.reader.rest()?;
-                // What a file holds is known now; what a stream brings may take its time.
-                if !matches!(rest, Rest::Pipe(_)) {
-                    rest.begins_frame(&self.header.name)?;
-                }
-                sequence.go_on(rest);
+                sequence.go_on(self.reader.rest()?, &self.header.name)?;
             }
             None if below == 0 => self.reader.rest()?.end(&self.header.name)?,
             None => {}
