@@ -80,7 +80,8 @@ fn of_pixels(
     });
     let sites = mixture.site_covariance();
     let first_order = gains.of(&sites);
-    if !sites.is_independent() {
+    let has_lines = found.iter().any(|entry| entry.cause.shared_by().is_some() && entry.variance != [0.0; 3]);
+    if has_lines || !sites.is_independent() {
         // What is curved in what rows and columns share: of what is drawn anew in each exposure, and of what is not.
         let anew = first_order - fixed.first_order;
         let parts = [(false, curving(causes), anew), (true, Cause::ClippedPattern, fixed.first_order)];
@@ -93,9 +94,12 @@ fn of_pixels(
             }
         }
     }
-    let of_pattern = fixed.covariance - fixed.first_order;
-    found[Cause::CurvedPattern as usize].variance = of_pattern.diagonal().into();
-    found[Cause::Curvature as usize].variance = (covariance - first_order - of_pattern).diagonal().into();
+    let all = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i].abs()).sum::<f64>());
+    let [pattern, whole] = [fixed.covariance - fixed.first_order, covariance - first_order];
+    // Where nothing is curved there is rounding.
+    let of_pattern = [0, 1, 2].map(|i| if pattern[(i, i)].abs() > 1e-13 * all[i] { pattern[(i, i)] } else { 0.0 });
+    found[Cause::CurvedPattern as usize].variance = of_pattern;
+    found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| whole[(i, i)] - of_pattern[i]);
     found
 }
 

@@ -322,22 +322,22 @@ impl Photosite {
         };
         let is_within = |adc: &AdcRecord| !adc.is_bent() && laws.iter().all(|law| law.is_within(adc));
         // Of full photosites nothing blurs codes but what is added.
-        let is_cut_in_codes = is_cut || is_full;
+        let is_cut_in_codes = |adc: &AdcRecord| is_cut || is_full && adc.adu_per_e * own.added() < BLURRED;
         let found = match &self.adc {
             None => Some(if is_cut { Regime::Curved } else { Regime::Straight }),
-            Some(adc) if !is_cut_in_codes && is_within(adc) && is_blurred(adc, BLURRED) => Some(Regime::Straight),
+            Some(adc) if !is_cut_in_codes(adc) && is_within(adc) && is_blurred(adc, BLURRED) => Some(Regime::Straight),
             Some(_) if !is_corrected => Some(Regime::Curved),
             Some(adc) => is_blurred(adc, BLURRED_ON_AVERAGE).then_some(Regime::OnAverage),
         };
         match found {
             None if !self.has_tails() => Err(Unpredictable::Beyond(TOO_COARSE)),
             Some(Regime::Curved) if self.drifts() && !self.has_tails() => {
-                let is_reached = |adc: &AdcRecord| is_cut_in_codes || laws.iter().any(|law| !law.is_within(adc));
+                let is_reached = |adc: &AdcRecord| is_cut_in_codes(adc) || laws.iter().any(|law| !law.is_within(adc));
                 let is_bent = self.adc.as_ref().is_some_and(|adc| adc.is_bent() && !is_reached(adc));
                 Err(Unpredictable::Beyond(if is_bent { DRIFT_BENT } else { DRIFT_CUT }))
             }
             Some(regime) if regime == Regime::Straight || !self.has_tails() => Ok(regime),
-            Some(Regime::Curved) if !is_cut_in_codes && self.adc.as_ref().is_some_and(is_within) => {
+            Some(Regime::Curved) if self.adc.as_ref().is_some_and(|adc| !is_cut_in_codes(adc) && is_within(adc)) => {
                 Err(Unpredictable::Beyond(COARSE_LINES))
             }
             _ => Err(Unpredictable::Beyond(WITH_LINES)),
