@@ -28,6 +28,7 @@ mod levels;
 mod linearization;
 mod makers;
 mod mistakes;
+mod near_full_well;
 mod noise;
 mod nothing_lost;
 mod over_frames;

@@ -67,7 +67,7 @@ fn lit_by_none(curve: &Curve, flats: &[Level]) -> Option<String> {
 
 /// Flats of more photons that have less signal; of full photosites it is less where more of their charge is that of the dark.
 fn exchanged(curve: &Curve, flats: &[Level]) -> Option<String> {
-    let below = below_saturation(flats);
+    let below = below_saturation(flats, curve.cut_from);
     let counted = |flat: usize| Some((flat, flats[flat].condition.photons?));
     let mut counted: Vec<(usize, f64)> = (0..flats.len()).filter_map(counted).collect();
     counted.sort_by(|a, b| a.1.total_cmp(&b.1));

@@ -1,13 +1,13 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
-use super::curve::{Curve, Values, below_saturation, stuck_shares, without_clipped, without_stuck};
+use super::curve::{Curve, Values, below_saturation, first_cut, stuck_shares, without_clipped, without_stuck};
 use super::dark::{doubling_temperature, parted_pattern, pixel_noise};
 use super::doubts::doubts;
 use super::level::{Level, is_same_time};
 use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, fixed, of_light, temporal, with_hidden};
-use super::reasons::{NO_NOISE, Reasons, UNSATURATED, of_gain, time_of_noise};
+use super::reasons::{NO_NOISE, Reasons, of_gain, time_of_noise};
 use super::rounding::{Steps, least_normal};
 use super::scatter::Scatter;
 use super::settings::Settings;
@@ -35,7 +35,8 @@ pub fn of_class(
     let ((darks, is_left_out), clipped) = (without_clipped(&darks, &flats, rounding), darks.len());
     let clipped = clipped - darks.len();
     let (flats, darks, all_darks) = (&flats[..], &darks[..], &all_darks[..]);
-    let below: Vec<&Level> = below_saturation(flats).into_iter().map(|flat| &flats[flat]).collect();
+    let below: Vec<&Level> =
+        below_saturation(flats, first_cut(flats, darks, rounding)).into_iter().map(|flat| &flats[flat]).collect();
     let steady = if is_left_out { without_clipped(all_darks, flats, rounding).0 } else { all_darks.to_vec() };
     let scatter = Scatter::of(&below, &steady);
     let curve_of = |levels: [&[Level]; 2]| {
@@ -236,7 +237,7 @@ fn widened(Interval { value, low, high }: Interval, variance: f64, confidence: f
 fn straightness(reasons: Reasons, scatter: &Scatter, confidence: f64) -> Result<Linearity, String> {
     let Reasons { curve, flats, .. } = reasons;
     let light = |level: &Level| level.condition.photons.or(level.condition.exposure_s);
-    let peak = curve.saturated.ok_or(UNSATURATED)?;
+    let peak = curve.saturated.ok_or_else(|| reasons.of_saturation())?;
     if !curve.knows_black(peak) {
         return Err(reasons.of_darks());
     }
@@ -260,7 +261,7 @@ fn straightness(reasons: Reasons, scatter: &Scatter, confidence: f64) -> Result<
 /// The flat and the dark that patterns are measured on: of the most frames, the flat below saturation at every photosite; of such, the
 /// flat nearest to half of saturation, and the dark of its exposure time, or, where there is none, the one nearest to that.
 fn stacks<'a>(curve: &Curve, flats: &'a [Level], darks: &'a [Level]) -> [Option<(usize, &'a Level)>; 2] {
-    let half = curve.saturated.map_or_else(
+    let half = curve.saturated.or(curve.cut_from).map_or_else(
         || curve.fitted().last().map_or(0.0, |&flat| curve.signal(flat)) / 2.0,
         |peak| curve.signal(peak) / 2.0,
     );
@@ -323,6 +324,13 @@ fn add_patterns(
 
 fn notes(curve: &Curve, flats: &[Level], frames: Option<usize>, limit: &Limit) -> Vec<String> {
     let mut notes: Vec<String> = limit.told.iter().cloned().collect();
+    if let Some(cut) = curve.cut_from {
+        notes.push(format!(
+            "part of the photosites is cut off in flats of a mean of {:.1} ADU and more, the brighter of which have less noise than others: gain and \
+             responsivity are told by flats of up to 70 % of that, or of up to 90 % where there are none, as patterns are",
+            flats[cut].mean
+        ));
+    }
     let most = flats.iter().map(|flat| flat.frames).max();
     if let Some((frames, most)) = frames.zip(most).filter(|(frames, most)| frames < most) {
         notes.push(format!(

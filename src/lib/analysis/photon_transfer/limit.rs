@@ -2,7 +2,7 @@
 
 use super::curve::{Curve, LEAST_VARIANCE, may_be_largest};
 use super::level::Level;
-use super::reasons::{CLIPPED, Reasons, UNSATURATED};
+use super::reasons::{CLIPPED, Reasons};
 use super::settings::Settings;
 use super::sheet::{Found, over};
 use crate::numerics::variance_components::Interval;
@@ -69,7 +69,7 @@ impl Limit {
             Ok(gain) => gain,
             Err(why) => return all(why),
         };
-        let Some(peak) = curve.saturated else { return all(UNSATURATED.into()) };
+        let Some(peak) = curve.saturated else { return all(reasons.of_saturation()) };
         if !curve.knows_black(peak) {
             return all(reasons.of_darks());
         }

@@ -6,6 +6,7 @@
 mod curve;
 mod dark;
 mod doubts;
+mod falling;
 mod findings;
 mod fit;
 mod hot;

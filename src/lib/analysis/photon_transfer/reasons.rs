@@ -1,6 +1,6 @@
 //! Why a number does not follow from the levels of a class, and which frames would tell it.
 
-use super::curve::{Curve, LEAST_VARIANCE, cut_off, hot_share};
+use super::curve::{Curve, LEAST_VARIANCE, cut_off, first_cut, hot_share};
 use super::level::Level;
 
 /// Of darks whose noise code 0 cuts off.
@@ -10,8 +10,7 @@ pub const CLIPPED: &str =
 pub const CUT_OFF: &str = "hot photosites are full, or reach the largest code, in the longer darks: it takes darks at three shorter \
                            exposure times or more";
 /// Of flats no one of which is beyond saturation.
-pub const UNSATURATED: &str =
-    "the variance still rises at the brightest flat: brighter ones, until it falls, would tell";
+const UNSATURATED: &str = "the variance still rises at the brightest flat: brighter ones, until it falls, would tell";
 
 /// Of what frames without any noise do not tell.
 pub const NO_NOISE: &str = "the frames show none at all, not even noise: it takes frames as a camera gives them";
@@ -52,6 +51,16 @@ impl Reasons<'_> {
              which `exposure_s` of a list tells"
                 .into()
         }
+    }
+
+    /// Why saturation is not told.
+    pub fn of_saturation(self) -> String {
+        let Some(cut) = self.curve.cut_from else { return UNSATURATED.into() };
+        format!(
+            "part of the photosites is cut off from a mean of {:.1} ADU on, but the variance falls in no flat: some of a tenth more light than \
+             that would tell",
+            self.flats[cut].mean
+        )
     }
 
     /// Why temporal noise of darks, or the pattern beneath it, is not told.
@@ -112,7 +121,11 @@ pub fn silent() -> String {
 
 /// Why no gain follows from flats.
 pub fn of_gain(flats: &[Level], darks: &[Level], rounding: f64) -> String {
-    let reasons: Vec<&str> = flats.iter().filter_map(|flat| cut_off(flat, hot_share(darks), rounding)).collect();
+    let (hot, cut_from) = (hot_share(darks), first_cut(flats, darks, rounding).unwrap_or(flats.len()));
+    let reason = |(place, flat): (usize, &Level)| {
+        cut_off(flat, hot, rounding).or((place >= cut_from).then_some("have photosites that are cut off"))
+    };
+    let reasons: Vec<&str> = flats.iter().enumerate().filter_map(reason).collect();
     let mut kinds = reasons.clone();
     kinds.sort_unstable();
     kinds.dedup();

@@ -144,7 +144,7 @@ fn off_response(curve: &Curve, flats: &[Level], scatter: &Scatter) -> Vec<Suspec
     const SHARES: [f64; 2] = [0.1, 0.005];
     let is_by_photons = flats.iter().all(|flat| flat.condition.photons.is_some());
     let light = |flat: &Level| if is_by_photons { flat.condition.photons } else { flat.condition.exposure_s };
-    let known: Vec<(usize, f64)> = below_saturation(flats)
+    let known: Vec<(usize, f64)> = below_saturation(flats, curve.cut_from)
         .into_iter()
         .filter(|&flat| curve.knows_black(flat))
         .filter_map(|flat| Some((flat, light(&flats[flat]).filter(|light| *light > 0.0)?)))

@@ -1,5 +1,6 @@
 //! Sums over a grid of photosites, row by row, and what they tell.
 
+use super::falling::{Falling, FallingSums};
 use super::lanes::{depart, dot, sum};
 use super::neighbors::NeighborSums;
 use super::sites::Site;
@@ -46,6 +47,8 @@ pub struct SiteSurvey {
     /// The correlation of the temporal noise of neighbors, in a row and in a column, beyond that of photosites farther apart, each with what it
     /// scatters by, a variance.
     pub neighbors: [[f64; 2]; 2],
+    /// How the temporal noise of photosites goes with their means.
+    pub falling: Falling,
     /// Frames whose fixed pattern is not that of the others.
     pub strangers: Vec<usize>,
     /// Two frames whose samples are the same, or differ by one number alone, though they vary from photosite to photosite.
@@ -95,6 +98,8 @@ pub struct Tally {
     slopes: RowSlopes,
     /// What neighbors have in common.
     neighbors: NeighborSums,
+    /// How noise goes with ȳ.
+    falling: FallingSums,
     /// Σ d² and Σ d⁴, d the differences of ȳ between neighbors in a row.
     steps: [f64; 2],
     /// Σ q and Σ q², q the sum of squares of a photosite about its row.
@@ -136,6 +141,7 @@ impl Tally {
             products: vec![0.0; frames],
             slopes: RowSlopes::new(frames),
             neighbors: NeighborSums::new(columns, if frames == 2 { 1 } else { frames }),
+            falling: FallingSums::default(),
             steps: [0.0; 2],
             within: [0.0; 2],
             samples: vec![0.0; columns * frames],
@@ -268,6 +274,7 @@ impl Tally {
             self.row_sums.push(-of_row);
         }
         self.row_squares.push(times * all);
+        self.falling.add(&self.squared, &self.above);
         self.within[0] += times * sum(&self.squared);
         self.within[1] += times * times * dot(&self.squared, &self.squared);
     }
@@ -332,7 +339,7 @@ impl Tally {
         self.complete();
         let [columns, rows] = self.size.map(|extent| extent as f64);
         let n = rows * columns;
-        let frames = self.frames as f64;
+        let (frames, times) = (self.frames as f64, self.times());
         let above: f64 = self.row_means.iter().sum::<f64>() / n;
         let mean = self.center + above;
         let spatial_sum = self.squares - n * above * above;
@@ -392,6 +399,7 @@ impl Tally {
             temporal,
             spatial,
             excess: excess(self.within, self.frames, n),
+            falling: self.falling.finish(frames, times),
             neighbors: self.neighbors.finish(self.frames),
             fourth,
             frame_means: drifts.iter().map(|drift| mean + drift).collect(),

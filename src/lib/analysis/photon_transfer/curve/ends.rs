@@ -1,5 +1,6 @@
 //! Samples at the ends of the codes, photosites that are full, and where flats saturate.
 
+use super::super::falling::Falling;
 use super::super::level::{Level, is_same_time};
 use crate::numerics::quantiles;
 
@@ -94,15 +95,31 @@ pub fn without_clipped(darks: &[Level], flats: &[Level], rounding: f64) -> (Vec<
     if is_told { (whole, true) } else { (darks.to_vec(), false) }
 }
 
-/// Flats of light that is well below saturation, so that their means follow it, by their places.
-pub fn below_saturation(flats: &[Level]) -> Vec<usize> {
+/// Flats of light that is well below saturation, so that their means follow it, by their places; from one on photosites are cut off.
+pub fn below_saturation(flats: &[Level], cut_from: Option<usize>) -> Vec<usize> {
     /// Of the mean that saturates.
     const SHARE: f64 = 0.95;
     /// More samples than these at the largest code, and means do not follow the light.
     const FEW: f64 = 1e-3;
     let reach = peak(flats).map_or(f64::INFINITY, |peak| SHARE * flats[peak].mean);
     let is_below = |flat: &usize| flats[*flat].at_ends[0] <= FEW && flats[*flat].mean <= reach;
-    (0..flats.len()).filter(is_below).collect()
+    (0..cut_from.unwrap_or(flats.len())).filter(is_below).collect()
+}
+
+/// The flat from which on part of the photosites is cut off, where no variance falls that would show it: bright photosites have less noise than
+/// others, in the brightest flat and in all from this one on. Those that reach the largest code are left out anyway.
+pub fn first_cut(flats: &[Level], darks: &[Level], rounding: f64) -> Option<usize> {
+    if peak(flats).is_some() {
+        return None;
+    }
+    let hot = hot_share(darks);
+    let black = darks.iter().map(|dark| dark.mean).reduce(f64::min).unwrap_or(0.0);
+    let is_cut = |flat: &Level| {
+        let falling = Falling::of_all(flat.sites.iter().map(|site| site.falling));
+        falling.is_cut([flat.variance, flat.frames as f64], flat.mean - black, flat.hidden(rounding).variance)
+    };
+    let within = (0..flats.len()).rev().filter(|&flat| flats[flat].at_ends[0] <= hot + FEW_AT_ENDS);
+    within.take_while(|&flat| is_cut(&flats[flat])).last()
 }
 
 /// The flat of the largest temporal variance, where a brighter one has less beyond chance \[EMVA1288, Sec. 6.6].

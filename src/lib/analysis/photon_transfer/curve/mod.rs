@@ -17,7 +17,7 @@ mod response;
 mod weights;
 
 pub use ends::{
-    LEAST_VARIANCE, are_whole, below_saturation, cut_off, full_mean, hot_share, is_clipped, may_be_largest,
+    LEAST_VARIANCE, are_whole, below_saturation, cut_off, first_cut, full_mean, hot_share, is_clipped, may_be_largest,
     stuck_shares, without_clipped, without_stuck,
 };
 pub use weights::BEYOND_FIVE;
@@ -58,6 +58,8 @@ pub struct Curve {
     patterned: Vec<usize>,
     /// The flat whose variance is the largest, where brighter ones have less.
     pub saturated: Option<usize>,
+    /// The flat from which on part of the photosites is cut off, where no variance falls.
+    pub cut_from: Option<usize>,
     /// Whether the variance of no light is left to the fit, as darks are silent beneath the rounding, clipped, or absent, or of times that
     /// are not known.
     pub is_offset_free: bool,
@@ -128,6 +130,7 @@ impl Curve {
             fitted: Vec::new(),
             patterned: Vec::new(),
             saturated: peak(flats),
+            cut_from: first_cut(flats, darks, rounding),
             is_offset_free: is_silent || are_darks_clipped,
             is_silent: is_silent && !darks.is_empty(),
             are_darks_clipped,
@@ -144,15 +147,20 @@ impl Curve {
         };
         curve.beneath = curve.flats.iter().map(|flat| curve.beneath(flat)).collect();
         let no_light = |index: usize| curve.no_light(index).map_or(0.0, |[mean, _]| mean);
-        let saturation = curve.saturated.map_or(f64::INFINITY, |peak| flats[peak].mean - no_light(peak));
+        let signal = |flat: usize| flats[flat].mean - no_light(flat);
+        // What is cut off ends less than a spread of the photosites above.
+        let saturation = curve.saturated.or(curve.cut_from).map_or(f64::INFINITY, signal);
         let whole = |highest: f64| -> Vec<usize> {
             let is_whole = |&index: &usize| {
                 let is_told = cut_off(&flats[index], hot, rounding).is_none();
-                is_told && flats[index].mean - no_light(index) <= highest * saturation
+                is_told && signal(index) <= highest * saturation
             };
             (0..flats.len()).filter(is_whole).collect()
         };
         (curve.fitted, curve.patterned) = (whole(HIGHEST), whole(HIGHEST_PATTERN));
+        if curve.fitted.is_empty() && curve.cut_from.is_some() {
+            curve.fitted = curve.patterned.clone();
+        }
         if !curve.is_offset_free && curve.fitted.iter().any(|&index| curve.beneath[index] == Beneath::Unknown) {
             curve.is_offset_free = true;
         }
