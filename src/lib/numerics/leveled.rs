@@ -189,8 +189,10 @@ fn drawn(samples: &[Sample], clip: f64) -> LeveledKept {
             let all = samples.iter().zip(&normals);
             all.map(move |(one, z)| to_sample(one.std * f64::from(*z) + off * one.shift))
         };
-        (at.clear(), moved.clear());
-        (at.extend(of(0.0)), moved.extend(of(MOVED)));
+        at.clear();
+        moved.clear();
+        at.extend(of(0.0));
+        moved.extend(of(MOVED));
         let [own, beside] = [clipped(&mut at, clip).0, clipped(&mut moved, clip).0];
         square += own * own;
         shift += (beside - own) / MOVED;
@@ -207,12 +209,12 @@ mod tests {
     /// Samples of one level keep what those of the tables of `averages` do.
     #[test]
     fn samples_of_one_level_are_those_of_the_tables() {
-        for (count, variance) in [(3, 0.448_671), (5, 0.286_834), (7, 0.210_447), (4, 0.298_2), (6, 0.214_737)] {
-            let kept = Leveled::of(Combine::Median, CLIP, &vec![1.0; count]);
+        for (count, variance) in [(3_u32, 0.448_671), (5, 0.286_834), (7, 0.210_447), (4, 0.298_2), (6, 0.214_737)] {
+            let kept = Leveled::of(Combine::Median, CLIP, &vec![1.0; count as usize]);
             for share in [0.0, 0.3, 1.0] {
                 let LeveledKept { variance: found, lean, shift } = kept.at(share);
                 assert!((found / variance - 1.0).abs() < 1e-4, "{count}: {found}");
-                let alike = Kept::of(Combine::Median, count as u32, CLIP, 1.0);
+                let alike = Kept::of(Combine::Median, count, CLIP, 1.0);
                 assert!((lean - alike.lean).abs() < 1e-4 && (shift - 1.0).abs() < 1e-6, "{count}: {lean} {shift}");
             }
         }

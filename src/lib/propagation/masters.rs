@@ -70,17 +70,20 @@ fn share_of(part: f64, all: f64) -> f64 {
     if all > 0.0 { part / all } else { 1.0 }
 }
 
+/// What is asked of leveled samples: how they are averaged, clipped where, and from which levels.
+type AskedLeveled = (Combine, u64, Vec<u64>);
+
 /// What averages of leveled samples keep, worked out once for each.
 fn leveled(combine: Combine, clip: f64, levels: &[f64]) -> Leveled {
-    static KNOWN: Mutex<Vec<(Combine, u64, Vec<u64>, Leveled)>> = Mutex::new(Vec::new());
+    static KNOWN: Mutex<Vec<(AskedLeveled, Leveled)>> = Mutex::new(Vec::new());
     let bits: Vec<u64> = levels.iter().map(|level| level.to_bits()).collect();
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    let is_asked = |of: &&(Combine, u64, Vec<u64>, Leveled)| of.0 == combine && of.1 == clip.to_bits() && of.2 == bits;
-    if let Some((.., found)) = known.iter().find(is_asked) {
+    let asked = (combine, clip.to_bits(), bits);
+    if let Some((_, found)) = known.iter().find(|(of, _)| *of == asked) {
         return *found;
     }
     let found = Leveled::of(combine, clip, levels);
-    known.push((combine, clip.to_bits(), bits, found));
+    known.push((asked, found));
     found
 }
 
