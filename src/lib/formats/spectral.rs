@@ -223,16 +223,16 @@ pub fn read_library(path: &Path, unit: Option<RadianceUnit>) -> Result<(Spectral
         }
         None => {
             warnings.extend(negative(&name, &library.radiance));
-            if let Some(mean) = library.radiance.mean_axis(Axis(0)) {
-                warnings.extend(doubt_of_radiances(
-                    &format!("{name}, on average"),
-                    &library.wavelength_nm,
-                    &mean.to_vec(),
-                ));
-            }
+            warnings.extend(cut_off_on_average(&name, &library));
             Ok((library, warnings))
         }
     }
+}
+
+/// A warning of a mean radiance that no light has.
+fn cut_off_on_average(name: &str, library: &SpectralLibrary) -> Option<String> {
+    let mean = library.radiance.mean_axis(Axis(0))?;
+    doubt_of_radiances(&format!("{name}, on average"), &library.wavelength_nm, &mean.to_vec())
 }
 
 /// A warning of radiances below zero, if there are any.

@@ -59,6 +59,14 @@ pub struct SquareSums {
 }
 
 impl MeanSquares {
+    /// Each as [`MeanSquare::with_tails`] has it.
+    #[must_use]
+    pub fn with_tails(self, cumulant: f64, count: f64) -> Self {
+        let [rows, columns, rest] =
+            [self.rows, self.columns, self.rest].map(|square| square.with_tails(cumulant, count));
+        Self { rows, columns, rest }
+    }
+
     /// Of tables of so many rows and columns, from sums over all of them; `tables` are as many as have means of their own.
     pub fn of(sums: SquareSums, [columns, rows]: [usize; 2], tables: f64) -> Self {
         let [c, r] = [columns as f64, rows as f64];

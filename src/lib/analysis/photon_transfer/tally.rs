@@ -380,10 +380,8 @@ impl Tally {
         let sums = SquareSums { all, rows: columns * by_rows, columns: rows * by_columns };
         let temporal = MeanSquares::of(sums, self.size, frames - 1.0);
         let fourth = self.fourth();
-        let MeanSquares { rows: of_rows, columns: of_columns, rest } = MeanSquares::of(spatial, self.size, 1.0);
-        let [of_rows, of_columns, rest] = [of_rows, of_columns, rest].map(|square| square.with_tails(fourth, n));
+        let spatial = MeanSquares::of(spatial, self.size, 1.0).with_tails(fourth, n);
         let variance = all.max(0.0) / ((frames - 1.0) * (n - 2.0));
-        let spatial = MeanSquares { rows: of_rows, columns: of_columns, rest };
         SiteSurvey {
             frames: self.frames,
             size: self.size,

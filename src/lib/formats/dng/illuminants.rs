@@ -57,6 +57,7 @@ pub(super) fn temperature_of(file: &mut TiffFile, directory: &Directory, index: 
     }
     let most = BEFORE_SAMPLES + RATIO * SAMPLES.end();
     let Some(data) = tags::ILLUMINANT_DATA[index].numbers(file, directory, most as u64)? else { return Ok(None) };
+    #[expect(clippy::cast_possible_truncation, reason = "the tag holds bytes")]
     let data: Vec<u8> = data.into_iter().map(|byte| byte as u8).collect();
     let observer = load_observer()?;
     let white = white_of(&data, &observer, |bytes| file.number(bytes));
@@ -92,6 +93,7 @@ mod tests {
     /// Ratios of 10⁶, least byte first.
     fn ratios(numbers: &[f64]) -> Vec<u8> {
         const BELOW: u32 = 1_000_000;
+        #[expect(clippy::cast_possible_truncation, reason = "numbers of the test are small")]
         let ratio = |number: &f64| [(number * f64::from(BELOW)).round() as u32, BELOW].map(u32::to_le_bytes).concat();
         numbers.iter().flat_map(ratio).collect()
     }
