@@ -267,9 +267,9 @@ fn photosites_without_dark_current_bend_nothing_of_rows_and_columns() {
         let found = Predictor::new(settings).unwrap().predict(light).unwrap();
         for (wanted, slope) in [(ChainStage::Electrons, 1.0), (ChainStage::Adu, readout.adu_per_e)] {
             let stage = stage(&found, wanted);
-            for k in 0..3 {
+            for (k, e) in light.into_iter().enumerate() {
                 let of_line = |noise: f64, offset: f64, response: f64| {
-                    slope * slope * (noise * noise + offset * offset + (light[k] * response).powi(2))
+                    slope * slope * (noise * noise + offset * offset + (e * response).powi(2))
                 };
                 let row = of_line(readout.row_noise_e, readout.dsnu_row_e, readout.prnu_row);
                 let column = of_line(readout.column_noise_e, readout.dsnu_column_e, readout.prnu_column);
