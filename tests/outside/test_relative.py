@@ -168,7 +168,6 @@ class Relative(ProgramCase):
         for more, words in (
             ({50728: None}, "nothing tells the white of the exposure"),
             ({52531: signed(WARM)}, "a third illuminant (ColorMatrix3)"),
-            ({**both, 50778: (SHORT, [0])}, "the temperatures of its illuminants are not known"),
             ({50710: (1, [2, 1, 0])}, "its classes are others than R, G and B"),
             ({50728: ratios([0.0, 1.0, 1.0])}, "AsShotNeutral has a number that is not above 0"),
             ({50721: signed(np.ones((3, 3)))}, "singular"),
@@ -186,6 +185,10 @@ class Relative(ProgramCase):
                 refused = self.attempt(["import-raw", path, "-o", "b.exr", "--write-matrix", "b.yaml"])
                 self.assertEqual(refused.returncode, 1)
                 self.assertIn("a.dng: it tells no matrix", refused.stderr.decode())
+        # Of two whose illuminants have none the first counts alone.
+        write_dng(path, scene(12), 12, more={**both, 50778: (SHORT, [0])})
+        told = self.attempt(["import-raw", path, "-o", "a.exr", "-v"]).stderr.decode()
+        self.assertIn("its ColorMatrix1 counts alone: the temperatures of the illuminants are not known", told)
         # Of two, one whose illuminant has a temperature counts alone.
         for more in (both, {**both, 50779: (SHORT, [0])}):
             write_dng(path, scene(12), 12, more=more)
