@@ -96,7 +96,7 @@ fn subframe(header: &Header) -> Option<[i64; 2]> {
     (column.is_some() || row.is_some()).then(|| [column, row].map(Option::unwrap_or_default))
 }
 
-/// The letters of what came off before, by `CALSTAT` [SBFITSEXT]; of others than B, D and F nothing is known here.
+/// The letters of what came off before, by `CALSTAT`; of others than B, D and F nothing is known here.
 fn calibrated(header: &Header, notes: &mut Vec<String>) -> Option<String> {
     let told = header.text("CALSTAT").map(str::trim).filter(|told| !told.is_empty())?;
     let known: String = told.to_ascii_uppercase().chars().filter(|letter| "BDF".contains(*letter)).collect();
