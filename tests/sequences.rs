@@ -327,6 +327,9 @@ fn what_is_no_frame_is_refused() {
         ("mosaic --format tiff -o left.tiff", "left.tiff"),
         ("preview -o left.png", "left.png"),
         ("preview --caption -o left2.png", "left2.png"),
+        ("measure -o left.txt", "left.txt"),
+        ("measure -o left.csv", "left.csv"),
+        ("measure --plot left.svg", "left.svg"),
     ] {
         let output = shop.attempt(line, &with_junk);
         assert!(output.status.code() == Some(BAD_DATA) && said(&output).contains(junk), "{line}: {}", said(&output));
