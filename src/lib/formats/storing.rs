@@ -3,7 +3,7 @@
 use super::dng;
 use super::exr::{ExrCompression, ExrSamples, Layers};
 use super::format::SampleType;
-use super::places::{STDOUT_NAME, named};
+use super::places::{STDOUT_NAME, is_waited_on, named};
 use super::png;
 use super::tiff::{TiffCompression, TiffSamples};
 use super::viewable;
@@ -241,13 +241,15 @@ impl OutputOptions {
         if self.is_viewable { viewable::scale_of(header, fills_u16) } else { Ok(1.0) }
     }
 
-    /// Where the layers of an EXR stand.
+    /// Where the layers of an EXR stand: apart where that is asked for, and in files for viewers.
     ///
     /// # Errors
     ///
     /// [`Error::Usage`] where they cannot stand apart: a pipe carries one part.
     pub(super) fn layers(&self) -> Result<Layers> {
-        match (self.separates_layers, named(self.path.as_deref())) {
+        let file = named(self.path.as_deref());
+        match (self.separates_layers, file) {
+            (false, Some(file)) if self.is_viewable && !is_waited_on(file) => Ok(Layers::InAPartOfTheirOwn),
             (false, _) => Ok(Layers::BesideTheImage),
             (true, Some(_)) => Ok(Layers::InAPartOfTheirOwn),
             (true, None) => Err(Error::Usage(

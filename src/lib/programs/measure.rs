@@ -2,8 +2,7 @@
 
 use crate::cli;
 use crate::error::Result;
-use crate::formats::sequence::Sequence;
-use crate::formats::{output, plots};
+use crate::formats::plots;
 use crate::report::{self, Findings, ReportFormat};
 use crate::requests::independence::check_copies;
 use crate::requests::options::{Makes, Output};
@@ -62,20 +61,12 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
     let reports = Output { makes: Makes::Reports, ..Output::default() };
     let findings = Findings::new(format, frames.inputs.len() > 1, arguments.output.clone());
     let measured = session.each_frame::<Arguments>(frames, &reports, |turn| measure(arguments, turn, &findings));
-    // Of one stream that failed nothing has a name; of several files, those that are whole are told.
-    if measured.is_err() && frames.inputs.len() <= 1 && !output::is_stdout(arguments.output.as_deref()) {
-        return measured;
-    }
-    measured.and(findings.end())
+    findings.end(measured)
 }
 
 fn measure(arguments: &Arguments, turn: &cli::Turn<'_>, findings: &Findings) -> Result<()> {
     let cli::Turn { session, input, output, .. } = *turn;
-    let mut input = input.clone();
-    if arguments.measurement.plot.is_some() {
-        input.sequence = input.sequence.map(Sequence::settled);
-    }
-    let mut reader = arguments.input.with(input.clone()).open_all()?;
+    let mut reader = arguments.input.with(arguments.measurement.settled(input)).open_all()?;
     session.report_reader(&reader);
     let measurement = arguments.measurement.for_frame(input.path(), output.index, reader.header());
     let (report, portrait) = findings.measure(|laws| measurement.of(&mut reader, laws))?;

@@ -9,14 +9,15 @@ use super::blur::blur_e;
 use super::covariance::PAIRS;
 use super::effort;
 use super::law::Law;
-use super::lines::{Axis, MOST_NODES, TOO_COARSE, nodes};
+use super::line_means::{Kinds, LineMeans};
+use super::lines::{Axis, COARSE_LINES, MOST_NODES, TOO_COARSE, nodes};
 use super::moments::LineCovariance;
 use super::photosite::Photosite;
-use super::reading::{Reading, codes_of};
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::metadata::AdcRecord;
 use crate::numerics::gauss::panel;
 use crate::numerics::normal::density;
+use crate::stages::noise::NoiseModel;
 use nalgebra::Matrix3;
 
 /// Values of what is shared that are gone through at most where codes follow it by steps.
@@ -48,8 +49,8 @@ struct Shared {
     offset_e: f64,
     /// Relative response.
     response: f64,
-    /// What is a photosite's own, or other lines'.
-    laws: [Law; 3],
+    /// What is a photosite's own, or other lines', by class: all kinds.
+    kinds: [Kinds; 3],
     /// What of that blurs codes, e⁻, by class.
     blur_e: [f64; 3],
     expected_e: [f64; 3],
@@ -67,23 +68,30 @@ impl Photosite {
     }
 
     fn curved_within(&self, axes: &[Axis], expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
-        let mut rest = self.model;
+        let part = |model: &NoiseModel| axes.iter().fold(*model, |rest, axis| axis.without(&rest));
+        let rest = part(&self.model);
         let [mut offset_e, mut response] = [0.0_f64; 2];
         for axis in axes {
             let [temporal, fixed, of_response] = axis.parts(&self.model.lines);
             offset_e = offset_e.hypot(temporal.hypot(fixed));
             response = response.hypot(of_response);
-            rest = axis.without(&rest);
         }
         if offset_e == 0.0 && response == 0.0 {
             return Ok(Matrix3::zeros());
         }
-        let of_class = |expected_e: f64| self.adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e));
-        let laws = expected_e.map(|expected_e| Law::of(&rest, expected_e));
-        let shared = Shared { offset_e, response, laws, blur_e: expected_e.map(of_class), expected_e };
+        let of_class = |expected_e: f64| {
+            let blur = |adc: AdcRecord| blur_e(&rest, &adc, expected_e);
+            // Of hot photosites that are full nothing blurs codes but what is added.
+            self.adc.map_or(f64::INFINITY, blur).min(if rest.tails.has_hot() { rest.added() } else { f64::INFINITY })
+        };
+        let kinds = expected_e.map(|expected_e| self.kinds_of_line(expected_e, part));
+        let shared = Shared { offset_e, response, kinds, blur_e: expected_e.map(of_class), expected_e };
         let mut gains = shared.gains(None)?;
         let smooth = nodes(offset_e, shared.least_blur_e());
         let sharp = self.adc.filter(|_| smooth.len() * gains.len() > MOST_NODES);
+        if sharp.is_some() && self.has_tails() {
+            return Err(Unpredictable::Beyond(COARSE_LINES));
+        }
         if let Some(adc) = &sharp {
             gains = shared.gains(Some(adc))?;
         } else if smooth.len() * gains.len() > MOST_NODES {
@@ -92,9 +100,10 @@ impl Photosite {
         let (mut first, mut second) = ([0.0; 3], [0.0; 6]);
         let mut all = 0;
         let mut foreseen: Option<effort::Foreseen> = None;
-        let lines = gains.len();
+        let count = gains.len();
         for (u, of_u) in gains {
-            let gained = laws.map(|law| law.gained(1.0 + response * u));
+            let gained = shared.kinds.each_ref().map(|kinds| kinds.gained(1.0 + response * u));
+            let lines = shared.lines(&gained, self.adc);
             let offsets = match &sharp {
                 Some(adc) => &shared.offsets(adc, &gained)?,
                 None => &smooth,
@@ -103,13 +112,13 @@ impl Photosite {
             if all > MOST_STEPPED {
                 return Err(Unpredictable::Beyond(TOO_COARSE));
             }
-            let foreseen = foreseen.get_or_insert_with(|| effort::Foreseen::of(lines * offsets.len()));
+            let foreseen = foreseen.get_or_insert_with(|| effort::Foreseen::of(count * offsets.len()));
             for (v, of_v) in offsets {
                 foreseen.begin_next();
                 if effort::is_spent() {
                     return Err(Unpredictable::Beyond(TAKES_LONG));
                 }
-                let means = self.means(&shared, &gained, offset_e * v);
+                let means = shared.means(&lines, offset_e * v);
                 for (sum, mean) in first.iter_mut().zip(means) {
                     *sum += of_u * of_v * mean;
                 }
@@ -142,18 +151,18 @@ impl Photosite {
             |k: usize, l: usize| if k == l { 0.0 } else { both[(k, l)] - lines[k].row[l] - lines[k].column[l] };
         Ok([0, 1, 2].map(|k| [0, 1, 2].map(|l| beyond(k, l))))
     }
+}
 
-    /// The mean readings of photosites of a line, each about the center that its law has.
-    fn means(&self, shared: &Shared, gained: &[Law; 3], offset_e: f64) -> [f64; 3] {
-        let mean = |k: usize| {
-            let law = &shared.laws[k];
-            match self.adc {
-                // What is added to electrons is in them.
-                None => gained[k].expect(&law.of_electrons())[0] + offset_e,
-                Some(adc) => gained[k].expect(&Reading { offset_e, ..law.of_codes(&adc, codes_of(&adc)) })[0],
-            }
-        };
-        let same = |k: usize, other: usize| shared.expected_e[k] == shared.expected_e[other];
+impl Shared {
+    /// The photosites of a line, by class, each about the center that the law of most has.
+    fn lines(&self, gained: &[Kinds; 3], adc: Option<AdcRecord>) -> [LineMeans; 3] {
+        [0, 1, 2].map(|k| LineMeans::of(&gained[k], self.kinds[k].most(), adc, self.blur_e[k]))
+    }
+
+    /// The mean samples of photosites of a line.
+    fn means(&self, lines: &[LineMeans; 3], offset_e: f64) -> [f64; 3] {
+        let mean = |k: usize| lines[k].at(offset_e);
+        let same = |k: usize, other: usize| self.expected_e[k] == self.expected_e[other];
         let of_red = mean(0);
         let of_green = if same(1, 0) { of_red } else { mean(1) };
         let of_blue = match [same(2, 0), same(2, 1)] {
@@ -163,9 +172,7 @@ impl Photosite {
         };
         [of_red, of_green, of_blue]
     }
-}
 
-impl Shared {
     fn least_blur_e(&self) -> f64 {
         self.blur_e.into_iter().fold(f64::INFINITY, f64::min)
     }
@@ -173,7 +180,7 @@ impl Shared {
     /// Responses to go through, with their weights.
     fn gains(&self, sharp: Option<&AdcRecord>) -> Predicted<Vec<(f64, f64)>> {
         let brightest = (0..3).max_by(|a, b| self.expected_e[*a].total_cmp(&self.expected_e[*b])).unwrap_or(0);
-        let (law, spread_e) = (&self.laws[brightest], self.expected_e[brightest] * self.response);
+        let (law, spread_e) = (self.kinds[brightest].most(), self.expected_e[brightest] * self.response);
         // Brighter lines have more counts, whose law is smooth in the light whatever is read of each.
         if self.response == 0.0 || law.light.shot_std() > 0.0 {
             return Ok(nodes(spread_e, law.light.shot_std().hypot(self.least_blur_e())));
@@ -185,8 +192,9 @@ impl Shared {
         let mut steps = Vec::new();
         for k in 0..3 {
             let spread_e = self.expected_e[k] * self.response;
-            let full = [self.laws[k].full_well_e];
-            let charge_e = self.laws[k].light.rate + self.laws[k].dark.rate;
+            let law = self.kinds[k].most();
+            let full = [law.full_well_e];
+            let charge_e = law.light.rate + law.dark.rate;
             let at = |level_e: f64| Step { at: (level_e - charge_e) / spread_e, width: self.blur_e[k] / spread_e };
             steps
                 .extend(edges(adc, charge_e, REACH * spread_e + 9.0 * self.blur_e[k])?.into_iter().chain(full).map(at));
@@ -194,17 +202,17 @@ impl Shared {
         stepped(steps)
     }
 
-    /// What is added, in standard deviations of it, with weights, where codes follow it by steps.
-    fn offsets(&self, adc: &AdcRecord, gained: &[Law; 3]) -> Predicted<Vec<(f64, f64)>> {
+    /// What is added, in standard deviations of it, with weights, where codes follow it by steps, of photosites of one kind.
+    fn offsets(&self, adc: &AdcRecord, gained: &[Kinds; 3]) -> Predicted<Vec<(f64, f64)>> {
         if self.offset_e == 0.0 {
             return Ok(vec![(0.0, 1.0)]);
         }
         let mut steps = Vec::new();
-        for (k, law) in gained.iter().enumerate() {
-            if gained[..k].contains(law) {
+        for (k, kinds) in gained.iter().enumerate() {
+            if gained[..k].contains(kinds) {
                 continue;
             }
-            for charge_e in charges(law, adc)? {
+            for charge_e in charges(kinds.most(), adc)? {
                 let at = |edge_e: f64| Step {
                     at: (edge_e - charge_e) / self.offset_e,
                     width: self.blur_e[k] / self.offset_e,
@@ -297,8 +305,9 @@ fn stepped(mut steps: Vec<Step>) -> Predicted<Vec<(f64, f64)>> {
 mod tests {
     use super::*;
     use crate::metadata::PoissonKind;
+    use crate::numerics::normal::cumulative;
     use crate::propagation::Equations;
-    use crate::stages::noise::{LineNoise, NoiseModel, Tails};
+    use crate::stages::noise::{LineNoise, Tails};
     use std::f64::consts::TAU;
 
     /// Photosites of one bit, whose codes change at 50 000 e⁻, of no noise but of rows, of columns, and 20 e⁻ of their own.
@@ -344,6 +353,33 @@ mod tests {
                 let wanted = of_signs(shared) - of_signs(row * row) - of_signs(column * column);
                 assert!((beyond - wanted).abs() < 4e-8, "{row} {column}: {beyond} {wanted}");
             }
+        }
+    }
+
+    /// Readings that jump by −a, 0 or a, a exponential of mean A, are off by nothing or, half of them, by a number of density
+    /// e^(−|x|/A)/2A: with a normal one beside it the chance that both are beyond a code's step has a closed form, of whose square the
+    /// trapezoidal rule makes the covariance. Panels of 5 nodes in a are good to 10⁻⁶ of what jumps do.
+    #[test]
+    fn jumps_beside_a_step_blur_what_rows_share() {
+        let beyond = |x: f64, jump_e: f64| {
+            let [ratio, z] = [OWN_E / jump_e, x / OWN_E];
+            let tail = |sign: f64| (0.5 * ratio * ratio - sign * x / jump_e).exp() * cumulative(sign * z - ratio);
+            cumulative(-z) + 0.5 * (tail(1.0) - tail(-1.0))
+        };
+        for (row, jump_e, share, off) in
+            [(50.0, 60.0, 0.3, 0.0), (50.0, 60.0, 0.3, 70.0), (12.0, 15.0, 1.0, -20.0), (100.0, 40.0, 0.05, 30.0)]
+        {
+            let mut site = of_one_bit(row, 0.0);
+            site.model.tails = Tails { rts_share: share, rts_e: jump_e, ..Tails::default() };
+            let of_line = |z: f64| {
+                let x = -off - row * z;
+                (1.0 - 0.5 * share) * cumulative(-x / OWN_E) + 0.5 * share * beyond(x, jump_e)
+            };
+            let steps = || (-800..=800).map(|step| 0.01 * f64::from(step));
+            let mean = |of: &dyn Fn(f64) -> f64| steps().map(|z| 0.01 * density(z) * of(z)).sum::<f64>();
+            let wanted = mean(&|z| of_line(z).powi(2)) - mean(&of_line).powi(2);
+            let found = site.lines([5e4 + off; 3]).unwrap()[0].row[1];
+            assert!((found - wanted).abs() < 2e-6 * wanted, "{row} {jump_e} {off}: {found} {wanted}");
         }
     }
 

@@ -199,7 +199,7 @@ impl Photosite {
             return Ok([LineCovariance::default(); 3]);
         }
         let regime = self.regime(expected_e)?;
-        if self.has_tails() {
+        if self.has_tails() && regime != Regime::Curved {
             return self.lines_of_unlike(expected_e);
         }
         let mut slopes = [self.slope(); 3];
@@ -230,7 +230,7 @@ impl Photosite {
 
     /// Whether photosites of these signals follow what they share on a curve.
     pub(super) fn is_curved_in_lines(&self, expected_e: [f64; 3]) -> Predicted<bool> {
-        Ok(!self.has_tails() && self.regime(expected_e)? == Regime::Curved)
+        Ok(self.regime(expected_e)? == Regime::Curved)
     }
 
     /// What is shared as each class has it, with the part of the drift by such slopes to the charge.
@@ -330,17 +330,18 @@ impl Photosite {
             Some(adc) => is_blurred(adc, BLURRED_ON_AVERAGE).then_some(Regime::OnAverage),
         };
         match found {
-            None if !self.has_tails() => Err(Unpredictable::Beyond(TOO_COARSE)),
-            Some(Regime::Curved) if self.drifts() && !self.has_tails() => {
+            Some(Regime::Curved) if self.drifts() => {
                 let is_reached = |adc: &AdcRecord| is_cut_in_codes(adc) || laws.iter().any(|law| !law.is_within(adc));
                 let is_bent = self.adc.as_ref().is_some_and(|adc| adc.is_bent() && !is_reached(adc));
                 Err(Unpredictable::Beyond(if is_bent { DRIFT_BENT } else { DRIFT_CUT }))
             }
-            Some(regime) if regime == Regime::Straight || !self.has_tails() => Ok(regime),
-            Some(Regime::Curved) if self.adc.as_ref().is_some_and(|adc| !is_cut_in_codes(adc) && is_within(adc)) => {
+            Some(Regime::Curved)
+                if self.has_tails() && self.adc.as_ref().is_some_and(|adc| !is_cut_in_codes(adc) && is_within(adc)) =>
+            {
                 Err(Unpredictable::Beyond(COARSE_LINES))
             }
-            _ => Err(Unpredictable::Beyond(WITH_LINES)),
+            Some(regime) => Ok(regime),
+            None => Err(Unpredictable::Beyond(TOO_COARSE)),
         }
     }
 
@@ -433,12 +434,8 @@ enum Regime {
     Curved,
 }
 
-/// Why nothing is said of what rows and columns share.
-const WITH_LINES: &str = "full well or an end of the codes cuts off what rows or columns share, on a sensor that has hot \
-                                     pixels or random telegraph signals";
-
 /// Why nothing is said of it where codes show.
-const COARSE_LINES: &str = "it shows how codes are rounded, which hot pixels or random telegraph signals beside noise of rows or columns \
+pub(super) const COARSE_LINES: &str = "it shows how codes are rounded, which hot pixels or random telegraph signals beside noise of rows or columns \
                             hide from no formula here; give the sensor read noise";
 
 /// Standard normal numbers and their weights for a function that is smooth on the scale of `blur` of what they are times

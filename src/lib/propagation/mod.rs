@@ -24,6 +24,7 @@ pub mod gains;
 pub(crate) mod ground;
 mod law;
 mod level_variance;
+mod line_means;
 mod line_sampling;
 mod line_sums;
 pub mod linear;

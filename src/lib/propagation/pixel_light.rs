@@ -71,7 +71,7 @@ impl PixelVariances {
     /// Whether the variances at such levels of codes are known.
     pub fn are_told(&self, level: [f64; 3]) -> bool {
         let all = || self.uneven.iter().map(|uneven| &uneven.darkest).chain([&self.brightest]);
-        (0..3).all(|class| !all().any(|variances| level[class] < variances[class].told_from()))
+        (0..3).all(|class| all().all(|variances| variances[class].is_told(level[class])))
     }
 }
 

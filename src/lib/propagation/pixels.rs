@@ -224,10 +224,11 @@ impl PixelNoise {
             }
             covariance.map(|covariance| covariance / (share * share))
         };
-        let is_told = self.variances.are_told(level);
+        let of_taps = self.of_taps.as_ref().map(|taps| taps.at(level));
+        let is_told = self.variances.are_told(level) && of_taps.iter().flatten().all(|variance| !variance.is_nan());
         let mut variances = self.variances.at(level, share);
-        for (index, of_tap) in self.of_taps.iter().flat_map(|taps| taps.at(level)).enumerate() {
-            variances[index % 3] = variances[index % 3].max(of_tap);
+        for (index, of_tap) in of_taps.iter().flatten().enumerate() {
+            variances[index % 3] = variances[index % 3].max(*of_tap);
         }
         if !self.depends_on_hue {
             return (all(variances, None), is_told);

@@ -16,6 +16,7 @@ use super::budget::{Budget, Cause};
 use super::charge::charge;
 use super::effort;
 use super::law::Law;
+use super::line_means::Kinds;
 use super::masters::Dark;
 use super::memory::Memory;
 use super::moments::{Equations, Prediction};
@@ -118,7 +119,7 @@ impl Photosite {
         let amplitude_e = self.most(|tails| tails.rts_e);
         let is_too_fine = |expected_e: f64| {
             self.hot_nodes(expected_e, true).is_none()
-                || self.trap_nodes(expected_e).is_none() && self.jumps_show(expected_e, amplitude_e)
+                || self.trap_nodes(expected_e, true).is_none() && self.jumps_show(expected_e, amplitude_e)
         };
         if expected_e.into_iter().any(is_too_fine) {
             return beyond(TOO_FINE);
@@ -177,7 +178,7 @@ impl Photosite {
                 continue;
             }
             let traps = match hot == 0.0 && is_fine {
-                true => self.trap_nodes(expected_e).unwrap_or_default(),
+                true => self.trap_nodes(expected_e, true).unwrap_or_default(),
                 false => FEW.clone(),
             };
             let all: f64 = traps.iter().map(|(_, weight)| weight).sum();
@@ -293,8 +294,9 @@ impl Photosite {
         nodes(&knees, &ripples, is_fine)
     }
 
-    fn trap_nodes(&self, expected_e: f64) -> Option<Vec<(f64, f64)>> {
-        let Some(adc) = self.adc else { return nodes(&[], &Ripples::default(), true) };
+    /// Amplitudes of jumps; where `is_fine` as many as tell how codes are rounded.
+    fn trap_nodes(&self, expected_e: f64, is_fine: bool) -> Option<Vec<(f64, f64)>> {
+        let Some(adc) = self.adc else { return nodes(&[], &Ripples::default(), is_fine) };
         let mut knees = Vec::new();
         let mut ripples = Ripples::default();
         for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_rts()) {
@@ -308,6 +310,9 @@ impl Photosite {
                 width: width / amplitude_e,
                 reach: 24.0,
             }));
+            if !is_fine {
+                continue;
+            }
             let quiet = model.at(&State { hot: 0.0, trap: 0.0 });
             let law = Law::of(&quiet, light_e);
             let of = Rounded {
@@ -318,7 +323,27 @@ impl Photosite {
             };
             ripples.add(&of, |angle| law.damping(angle));
         }
-        nodes(&knees, &ripples, true)
+        nodes(&knees, &ripples, is_fine)
+    }
+
+    /// What photosites of a line differ in, each of what a part of their noise leaves; for sums over the rest.
+    pub(super) fn kinds_of_line(&self, expected_e: f64, part: impl Fn(&NoiseModel) -> NoiseModel) -> Kinds {
+        let law = |hot: f64| Law::of(&part(&self.model.at(&State { hot, trap: 0.0 })), expected_e);
+        let [hot_share, trap_share, trap_e] =
+            [|tails: &Tails| tails.hot_share, |tails: &Tails| tails.rts_share, |tails: &Tails| tails.rts_e]
+                .map(|of| self.most(of));
+        let of_share = |nodes: Option<Vec<(f64, f64)>>, share: f64| -> Vec<(f64, f64)> {
+            let nodes = nodes.filter(|_| share > 0.0).unwrap_or_default();
+            let sum: f64 = nodes.iter().map(|(_, weight)| weight).sum();
+            nodes.into_iter().map(|(at, weight)| (share * weight / sum, at)).collect()
+        };
+        let hot = of_share(self.hot_nodes(expected_e, false), hot_share);
+        let jumps_show = trap_share > 0.0 && self.jumps_show(expected_e, trap_e);
+        let jumps = of_share(self.trap_nodes(expected_e, false), if jumps_show { trap_share } else { 0.0 });
+        Kinds {
+            laws: std::iter::once((1.0 - hot_share, 0.0)).chain(hot).map(|(share, hot)| (share, law(hot))).collect(),
+            jumps: jumps.into_iter().map(|(share, trap)| (share, trap_e * trap)).collect(),
+        }
     }
 
     /// Moments of the samples of all kinds of photosites together.

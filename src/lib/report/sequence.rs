@@ -115,6 +115,7 @@ fn rows(Subject { file, frame }: &Subject, table: &str, with_head: bool) -> Resu
 /// Reports of all frames of a run on their way out, and what the checks among them say.
 pub struct Findings {
     output: Option<PathBuf>,
+    are_several: bool,
     found: Mutex<Found>,
     laws: Mutex<Laws>,
 }
@@ -134,6 +135,7 @@ impl Findings {
         let reports = Reports::new(format, are_several);
         Self {
             output,
+            are_several,
             laws: Mutex::default(),
             found: Mutex::new(Found { reports, text: String::new(), checked: 0, failed: Vec::new() }),
         }
@@ -163,12 +165,20 @@ impl Findings {
         Ok(())
     }
 
-    /// Writes what is left.
+    /// Writes what is left, as the work on all frames ended: of one stream that failed nothing gets a name, of several files those that
+    /// are whole are told.
     ///
     /// # Errors
     ///
-    /// Those of writing; [`Error::Data`] where a frame is not as predicted.
-    pub fn end(self) -> Result<()> {
+    /// That of the work; those of writing; [`Error::Data`] where a frame is not as predicted.
+    pub fn end(self, work: Result<()>) -> Result<()> {
+        if work.is_err() && !self.are_several && !output::is_stdout(self.output.as_deref()) {
+            return work;
+        }
+        work.and(self.write())
+    }
+
+    fn write(self) -> Result<()> {
         let Found { reports, mut text, checked, failed } =
             self.found.into_inner().unwrap_or_else(PoisonError::into_inner);
         text += &reports.end()?;

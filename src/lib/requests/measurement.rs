@@ -1,7 +1,7 @@
 //! Statistics of a frame beside what propagation predicts.
 
 use super::independence::check_exposures;
-use super::options::Output;
+use super::options::{Input, Output};
 use super::{batch, values};
 use crate::analysis::statistics::portrait::Portrait;
 use crate::analysis::statistics::{
@@ -12,6 +12,7 @@ use crate::error::Result;
 use crate::formats::places::{output_of, sidecar_path};
 use crate::formats::plots::PlotFormat;
 use crate::formats::register;
+use crate::formats::sequence::Sequence;
 use crate::metadata::FrameHeader;
 use crate::names::Named;
 use crate::propagation::Equations;
@@ -122,6 +123,13 @@ impl Measurement {
             level: self.check.then_some(self.level),
         };
         self.over.map(|Over::Frames| SharedFrames(Mutex::new(OverFrames::new(settings))))
+    }
+
+    /// The input of a frame: where it is drawn into a file, no bytes but frames may come behind.
+    pub fn settled(&self, input: &Input) -> Input {
+        let sequence = input.sequence.clone();
+        let sequence = if self.plot.is_some() { sequence.map(Sequence::settled) } else { sequence };
+        Input { sequence, ..input.clone() }
     }
 
     fn saturated(&self) -> Saturated {

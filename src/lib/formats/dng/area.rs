@@ -126,8 +126,8 @@ const MOST_AREAS: u64 = 64;
 /// Photosites beside the active area that light may leak into.
 const LEAK: u64 = 2;
 
-/// The default crop, as far as it is one of whole photosites in the active area; that area where there is none. Else why it
-/// is none, in words.
+/// The photosites that lie wholly within the default crop, where that lies in the active area; that area where there is none. Else why
+/// it is none, in words.
 ///
 /// # Errors
 ///
@@ -142,12 +142,17 @@ pub(super) fn default_crop(
     let size = size.unwrap_or([active.width as f64, active.height as f64]);
     let [left, top, width, height] = [origin[0], origin[1], size[0], size[1]];
     let shown = format!("its default crop, {width}x{height} from {left},{top} of the active area,");
-    if [left, top, width, height].iter().any(|side| side.fract() != 0.0) {
-        return Ok(Err(format!("{shown} does not begin and end at a photosite")));
-    }
     let fits = |from: f64, side: f64, most: usize| from >= 0.0 && side >= 1.0 && from + side <= most as f64;
     if !(fits(left, width, active.width) && fits(top, height, active.height)) {
         return Ok(Err(format!("{shown} does not lie in that area, which has {}x{}", active.width, active.height)));
+    }
+    // What a ratio of integers is off by as a double.
+    const ROUNDING: f64 = 1e-9;
+    let first = |from: f64| (from - ROUNDING).ceil().max(0.0);
+    let whole = |from: f64, side: f64| [first(from), (from + side + ROUNDING).floor() - first(from)];
+    let [[left, width], [top, height]] = [whole(left, width), whole(top, height)];
+    if width < 1.0 || height < 1.0 {
+        return Ok(Err(format!("{shown} has no whole photosite")));
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole and within the image")]
     let [left, top, width, height] = [left, top, width, height].map(|side| side as usize);

@@ -552,6 +552,12 @@ fn what_cannot_be_read_is_refused_by_name() {
     let reader = open(&crop.file(&[]), RawArea::Active).unwrap();
     assert!(reader.notes()[0].ends_with("does not lie in that area, which has 8x6; it is passed over"));
     assert!(open(&crop.file(&[]), RawArea::Default).is_err());
+    // Of a crop between photosites those count that lie in it.
+    let between = image.clone().with(50719, RATIO, &[1.0, 2.0, 2.0, 3.0]).with(50720, RATIO, &[7.0, 1.0, 13.0, 3.0]);
+    let crop = open(&between.file(&[]), RawArea::Default).unwrap().geometry().clone();
+    assert_eq!((crop.origin, [crop.width, crop.height]), ([1, 1], [6, 4]));
+    let narrow = image.clone().with(50719, RATIO, &[1.0, 2.0, 0.0, 1.0]).with(50720, RATIO, &[1.0, 1.0, 6.0, 1.0]);
+    assert!(open(&narrow.file(&[]), RawArea::Default).is_err());
 }
 
 /// A matrix whose illuminant is known counts without the other; what has other than its numbers does not.

@@ -126,7 +126,8 @@ pub struct Output {
     #[arg(long, value_name = "TYPE", value_parser = values::choice::<SampleKind>())]
     pub sample_type: Option<SampleKind>,
     /// Scale samples by a power of two so that viewers show them: white between half and all of 1, or of 16 bits. Programs of
-    /// this toolchain undo it to the bit. In a DNG levels go with them, whose fractions converters drop
+    /// this toolchain undo it to the bit. In a DNG levels go with them, whose fractions converters drop. Layers of an EXR stand
+    /// apart, as with --separate-layers
     #[arg(long)]
     pub viewable: bool,
     /// Put the layers of an EXR file (standard deviations, covariances, marks) into a second part of it, marked as data

@@ -1,0 +1,146 @@
+//! The mean sample of the photosites of a line, by what is added to their charge, where photosites are unlike each other.
+//!
+//! Of hot photosites and others it is the mean over all kinds, M(v). Whether a reading jumps does not hang on its charge, and a jump is
+//! added to that as v is, so that of shares s of amplitude a
+//!
+//! m(v) = (1 − Σ s) M(v) + Σ s \[M(v − a) + 2 M(v) + M(v + a)]/4
+//!
+//! M is worked out at even distances only, and only where an end of the codes is within reach: elsewhere it is straight, or constant.
+
+use super::law::Law;
+use super::reading::{Reading, codes_of};
+use crate::metadata::AdcRecord;
+use crate::numerics::rounding::REACH;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+/// The standard deviation, in codes, of what blurs them from which rounding moves no mean by more than e^(−2π²σ²)/π, 10⁻⁹ of a code.
+const STRAIGHT: f64 = 1.0;
+
+/// Distances in the width of what blurs the means: polynomials through [`POINTS`] places follow a normal blur to 7·10⁻⁶ of it.
+const DISTANCE: f64 = 1.0 / 3.0;
+const POINTS: usize = 8;
+
+/// Photosites of a class that differ: the laws of all kinds and their shares, most photosites first; shares and amplitudes of jumps, e⁻.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Kinds {
+    pub laws: Vec<(f64, Law)>,
+    pub jumps: Vec<(f64, f64)>,
+}
+
+impl Kinds {
+    /// The law of most photosites.
+    pub fn most(&self) -> &Law {
+        &self.laws[0].1
+    }
+
+    /// Those of lines whose photosites have this share of the light.
+    pub fn gained(&self, share: f64) -> Self {
+        let laws = self.laws.iter().map(|(weight, law)| (*weight, law.gained(share))).collect();
+        Self { laws, jumps: self.jumps.clone() }
+    }
+}
+
+/// The photosites of a class in one line.
+pub(super) struct LineMeans {
+    kinds: Vec<Kind>,
+    jumps: Vec<(f64, f64)>,
+    reading: Reading,
+    adc: Option<AdcRecord>,
+    spacing_e: f64,
+    known: RefCell<BTreeMap<i64, f64>>,
+}
+
+/// Photosites that are alike.
+struct Kind {
+    share: f64,
+    law: Law,
+    /// The mean charge, what is beyond full well left out.
+    charge_e: f64,
+    /// The least and the largest that is read, but for what is added.
+    reach_e: [f64; 2],
+    /// Whether next to nothing of how codes are rounded is left.
+    is_smooth: bool,
+}
+
+impl LineMeans {
+    /// Of samples about the center that `about` has, where no less than `blur_e` blurs codes.
+    pub fn of(kinds: &Kinds, about: &Law, adc: Option<AdcRecord>, blur_e: f64) -> Self {
+        let reading = adc.map_or_else(|| about.of_electrons(), |adc| about.of_codes(&adc, codes_of(&adc)));
+        let kind = |(share, law): &(f64, Law)| {
+            let electrons = law.of_electrons();
+            let [least, most] = law.extent().map(|charge| charge.min(law.full_well_e));
+            let noise_e = REACH * law.read_noise_e;
+            Kind {
+                share: *share,
+                law: *law,
+                charge_e: law.expect(&electrons)[0] + electrons.center,
+                reach_e: [least - noise_e, most + noise_e],
+                is_smooth: adc.is_none_or(|adc| adc.linearization.is_none() && adc.adu_per_e * blur_e >= STRAIGHT),
+            }
+        };
+        Self {
+            kinds: kinds.laws.iter().map(kind).collect(),
+            jumps: kinds.jumps.clone(),
+            reading,
+            adc,
+            spacing_e: DISTANCE * blur_e,
+            known: RefCell::default(),
+        }
+    }
+
+    /// The mean where so much is added to the charge.
+    pub fn at(&self, offset_e: f64) -> f64 {
+        if self.jumps.is_empty() {
+            return self.quiet(offset_e);
+        }
+        let middle = self.looked_up(offset_e);
+        let jump = |(share, amplitude_e): &(f64, f64)| {
+            let sides = self.looked_up(offset_e - amplitude_e) + self.looked_up(offset_e + amplitude_e);
+            share * (0.25 * sides - 0.5 * middle)
+        };
+        middle + self.jumps.iter().map(jump).sum::<f64>()
+    }
+
+    /// M at a place, by those at even distances around it.
+    fn looked_up(&self, offset_e: f64) -> f64 {
+        let place = offset_e / self.spacing_e;
+        let below = place.floor();
+        let t = place - below;
+        #[expect(clippy::cast_possible_truncation, reason = "places within reach of jumps")]
+        let first = below as i64 - (POINTS as i64 / 2 - 1);
+        let value = |index: i64| {
+            let worked_out = || self.quiet(index as f64 * self.spacing_e);
+            *self.known.borrow_mut().entry(index).or_insert_with(worked_out)
+        };
+        if t == 0.0 {
+            return value(first + POINTS as i64 / 2 - 1);
+        }
+        let (mut sum, mut all) = (0.0, 0.0);
+        // Barycentric: (−1)ʲ C(7, j).
+        let mut binomial = 1.0;
+        for point in 0..POINTS {
+            let distance = t + (POINTS / 2 - 1) as f64 - point as f64;
+            let weight = binomial / distance;
+            sum += weight * value(first + point as i64);
+            all += weight;
+            binomial *= -((POINTS - 1 - point) as f64) / (point + 1) as f64;
+        }
+        sum / all
+    }
+
+    /// M, by each kind.
+    fn quiet(&self, offset_e: f64) -> f64 {
+        let reading = self.reading.off_by(offset_e);
+        let mean = |kind: &Kind| {
+            let Some(adc) = self.adc else { return kind.charge_e - reading.center + offset_e };
+            let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
+            let [low, high] = kind.reach_e;
+            match kind.is_smooth && low + offset_e > lower && high + offset_e < upper {
+                true => adc.sample(adc.level_at(kind.charge_e + offset_e)) - reading.center,
+                false => kind.law.expect(&reading)[0],
+            }
+        };
+        self.kinds.iter().map(|kind| kind.share * mean(kind)).sum()
+    }
+}
