@@ -15,11 +15,12 @@ use super::repeated;
 use super::spaces::{Channels, Curved, OTHER_COLORS, is_curved, white};
 use super::tails;
 use super::tapped::TappedPixels;
-use super::taps::{self, Group};
+use super::tap_lines::Lit;
+use super::taps::{self, Group, TappedSites};
 use super::unpredictable::{OFFSETS_TOO_LONG, TOO_LONG};
 pub use super::unpredictable::{Predicted, Unpredictable};
 use crate::color;
-use crate::metadata::FrameHeader;
+use crate::metadata::{AverageRecord, FrameHeader};
 use crate::names::Named;
 use crate::stages::demosaic::Method;
 use crate::units::QuantityKind;
@@ -32,7 +33,7 @@ pub enum FramePrediction {
     /// Classes that are drawn apart: R, G and B before demosaicking.
     Planes([Prediction; 3]),
     /// Such classes in groups, one for each of the amplifiers that have read the frame.
-    Groups(Vec<Group>),
+    Groups(TappedSites),
     /// Pixels that are weighted sums of photosites.
     Pixels(Box<PixelMoments>),
     /// Such pixels where several amplifiers have read their photosites.
@@ -89,9 +90,12 @@ pub enum FramePrediction {
 /// # Ok::<(), cyanometer::error::Error>(())
 /// ```
 pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePrediction> {
-    let moments = |frame: &FrameHeader, equations| Ok(Sites::of(frame, equations)?.moments);
-    if let Some(groups) = taps::groups(frame, equations, moments)? {
-        return Ok(FramePrediction::Groups(groups));
+    let of_one = |frame: &FrameHeader, equations| {
+        let sites = Sites::of(frame, equations)?;
+        Ok((sites.lit(), sites.moments, sites.average(frame)?))
+    };
+    if let Some(sites) = taps::sites(frame, equations, of_one)? {
+        return Ok(FramePrediction::Groups(sites));
     }
     if taps::are_mixed(frame) {
         return Ok(FramePrediction::Tapped(Box::new(tapped(frame, equations)?)));
@@ -158,6 +162,16 @@ impl Sites {
         };
         ground.smeared.check_even(photosite.slope(), &sites.moments)?;
         Ok(sites)
+    }
+
+    fn lit(&self) -> Lit {
+        (self.photosite, self.expected_e)
+    }
+
+    /// How the exposures were averaged that the frame of these photosites is made of; none where it is one exposure.
+    fn average(&self, frame: &FrameHeader) -> Predicted<Option<AverageRecord>> {
+        let of_sites = quantity_of_sites(frame);
+        frame.metadata.average.as_ref().map(|record| repeated::average_of(frame, record, of_sites)).transpose()
     }
 
     /// Refuses frames whose photosites no formula tells, as far as that is known before anything is worked out.

@@ -6,7 +6,6 @@
 //! noise, or what is added, blurs it.
 
 use super::blur::blur_e;
-use super::covariance::PAIRS;
 use super::effort;
 use super::law::Law;
 use super::lines::{Axis, MOST_NODES, TOO_COARSE, nodes};
@@ -17,7 +16,7 @@ use super::unpredictable::{Predicted, Unpredictable};
 use crate::metadata::AdcRecord;
 use crate::numerics::gauss::panel;
 use crate::numerics::normal::density;
-use nalgebra::Matrix3;
+use nalgebra::{DMatrix, DVector, Matrix3};
 
 /// Values of what is shared that are gone through at most where codes follow it by steps.
 const MOST_STEPPED: usize = 6000;
@@ -42,17 +41,25 @@ struct Step {
     width: f64,
 }
 
-/// What rows or columns share, or both.
+/// What rows or columns share, or both, of photosites of some kinds: of R, G and B, of one amplifier or of several.
 struct Shared {
     /// What is added to the charge, e⁻.
     offset_e: f64,
     /// Relative response.
     response: f64,
+    kinds: Vec<Kind>,
+}
+
+/// Photosites of one kind.
+struct Kind {
     /// What is a photosite's own, or other lines'.
-    laws: [Law; 3],
-    /// What of that blurs codes, e⁻, by class.
-    blur_e: [f64; 3],
-    expected_e: [f64; 3],
+    law: Law,
+    /// What of that blurs codes, e⁻.
+    blur_e: f64,
+    expected_e: f64,
+    adc: Option<AdcRecord>,
+    /// The first kind that is the same.
+    same: usize,
 }
 
 impl Photosite {
@@ -62,68 +69,8 @@ impl Photosite {
     ///
     /// [`Unpredictable::Beyond`] where they are too many.
     pub(super) fn curved(&self, axes: &[Axis], expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
-        let found = effort::within(MOST_WORK, || self.curved_within(axes, expected_e));
-        found.unwrap_or(Err(Unpredictable::Beyond(TAKES_LONG)))
-    }
-
-    fn curved_within(&self, axes: &[Axis], expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
-        let mut rest = self.model;
-        let [mut offset_e, mut response] = [0.0_f64; 2];
-        for axis in axes {
-            let [temporal, fixed, of_response] = axis.parts(&self.model.lines);
-            offset_e = offset_e.hypot(temporal.hypot(fixed));
-            response = response.hypot(of_response);
-            rest = axis.without(&rest);
-        }
-        if offset_e == 0.0 && response == 0.0 {
-            return Ok(Matrix3::zeros());
-        }
-        let of_class = |expected_e: f64| self.adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e));
-        let laws = expected_e.map(|expected_e| Law::of(&rest, expected_e));
-        let shared = Shared { offset_e, response, laws, blur_e: expected_e.map(of_class), expected_e };
-        let mut gains = shared.gains(None)?;
-        let smooth = nodes(offset_e, shared.least_blur_e());
-        let sharp = self.adc.filter(|_| smooth.len() * gains.len() > MOST_NODES);
-        if let Some(adc) = &sharp {
-            gains = shared.gains(Some(adc))?;
-        } else if smooth.len() * gains.len() > MOST_NODES {
-            return Err(Unpredictable::Beyond(TOO_COARSE));
-        }
-        let (mut first, mut second) = ([0.0; 3], [0.0; 6]);
-        let mut all = 0;
-        let mut foreseen: Option<effort::Foreseen> = None;
-        let lines = gains.len();
-        for (u, of_u) in gains {
-            let gained = laws.map(|law| law.gained(1.0 + response * u));
-            let offsets = match &sharp {
-                Some(adc) => &shared.offsets(adc, &gained)?,
-                None => &smooth,
-            };
-            all += offsets.len();
-            if all > MOST_STEPPED {
-                return Err(Unpredictable::Beyond(TOO_COARSE));
-            }
-            let foreseen = foreseen.get_or_insert_with(|| effort::Foreseen::of(lines * offsets.len()));
-            for (v, of_v) in offsets {
-                foreseen.begin_next();
-                if effort::is_spent() {
-                    return Err(Unpredictable::Beyond(TAKES_LONG));
-                }
-                let means = self.means(&shared, &gained, offset_e * v);
-                for (sum, mean) in first.iter_mut().zip(means) {
-                    *sum += of_u * of_v * mean;
-                }
-                for (sum, [k, l]) in second.iter_mut().zip(PAIRS) {
-                    *sum += of_u * of_v * means[k] * means[l];
-                }
-            }
-        }
-        let mut found = Matrix3::zeros();
-        for (square, [k, l]) in second.into_iter().zip(PAIRS) {
-            found[(k, l)] = square - first[k] * first[l];
-            found[(l, k)] = found[(k, l)];
-        }
-        Ok(found)
+        let found = curved(&[(*self, expected_e)], axes)?;
+        Ok(Matrix3::from_fn(|k, l| found[(k, l)]))
     }
 
     /// What three samples of one place, each of its class, share by row and column together beyond what they share by either: where
@@ -142,74 +89,142 @@ impl Photosite {
             |k: usize, l: usize| if k == l { 0.0 } else { both[(k, l)] - lines[k].row[l] - lines[k].column[l] };
         Ok([0, 1, 2].map(|k| [0, 1, 2].map(|l| beyond(k, l))))
     }
+}
 
-    /// The mean readings of photosites of a line, each about the center that its law has.
-    fn means(&self, shared: &Shared, gained: &[Law; 3], offset_e: f64) -> [f64; 3] {
-        let mean = |k: usize| {
-            let law = &shared.laws[k];
-            match self.adc {
-                // What is added to electrons is in them.
-                None => gained[k].expect(&law.of_electrons())[0] + offset_e,
-                Some(adc) => gained[k].expect(&Reading { offset_e, ..law.of_codes(&adc, codes_of(&adc)) })[0],
-            }
-        };
-        let same = |k: usize, other: usize| shared.expected_e[k] == shared.expected_e[other];
-        let of_red = mean(0);
-        let of_green = if same(1, 0) { of_red } else { mean(1) };
-        let of_blue = match [same(2, 0), same(2, 1)] {
-            [true, _] => of_red,
-            [_, true] => of_green,
-            _ => mean(2),
-        };
-        [of_red, of_green, of_blue]
+/// Covariances of photosites that share such lines, of R, G and B of each of several amplifiers one after the other, by sums over what
+/// these share; the amplifiers are those of one sensor.
+///
+/// # Errors
+///
+/// [`Unpredictable::Beyond`] where they are too many.
+pub(super) fn curved(sites: &[(Photosite, [f64; 3])], axes: &[Axis]) -> Predicted<DMatrix<f64>> {
+    let found = effort::within(MOST_WORK, || curved_within(sites, axes));
+    found.unwrap_or(Err(Unpredictable::Beyond(TAKES_LONG)))
+}
+
+fn curved_within(sites: &[(Photosite, [f64; 3])], axes: &[Axis]) -> Predicted<DMatrix<f64>> {
+    let shared = Shared::of(sites, axes);
+    let count = shared.kinds.len();
+    if shared.offset_e == 0.0 && shared.response == 0.0 {
+        return Ok(DMatrix::zeros(count, count));
     }
+    let mut gains = shared.gains(false)?;
+    let smooth = nodes(shared.offset_e, shared.least_blur_e());
+    let are_many = smooth.len() * gains.len() > MOST_NODES;
+    let is_sharp = are_many && shared.kinds.iter().all(|kind| kind.adc.is_some());
+    if is_sharp {
+        gains = shared.gains(true)?;
+    } else if are_many {
+        return Err(Unpredictable::Beyond(TOO_COARSE));
+    }
+    let (mut first, mut second) = (DVector::zeros(count), DMatrix::zeros(count, count));
+    let mut all = 0;
+    let mut foreseen: Option<effort::Foreseen> = None;
+    let lines = gains.len();
+    for (u, of_u) in gains {
+        let gained: Vec<Law> = shared.kinds.iter().map(|kind| kind.law.gained(1.0 + shared.response * u)).collect();
+        let offsets = if is_sharp { &shared.offsets(&gained)? } else { &smooth };
+        all += offsets.len();
+        if all > MOST_STEPPED {
+            return Err(Unpredictable::Beyond(TOO_COARSE));
+        }
+        let foreseen = foreseen.get_or_insert_with(|| effort::Foreseen::of(lines * offsets.len()));
+        for (v, of_v) in offsets {
+            foreseen.begin_next();
+            if effort::is_spent() {
+                return Err(Unpredictable::Beyond(TAKES_LONG));
+            }
+            let means = shared.means(&gained, shared.offset_e * v);
+            first += of_u * of_v * &means;
+            second += of_u * of_v * &means * means.transpose();
+        }
+    }
+    Ok(second - &first * first.transpose())
 }
 
 impl Shared {
-    fn least_blur_e(&self) -> f64 {
-        self.blur_e.into_iter().fold(f64::INFINITY, f64::min)
+    fn of(sites: &[(Photosite, [f64; 3])], axes: &[Axis]) -> Self {
+        let mut shared = Self { offset_e: 0.0, response: 0.0, kinds: Vec::new() };
+        if let Some((site, _)) = sites.first() {
+            for axis in axes {
+                let [temporal, fixed, of_response] = axis.parts(&site.model.lines);
+                shared.offset_e = shared.offset_e.hypot(temporal.hypot(fixed));
+                shared.response = shared.response.hypot(of_response);
+            }
+        }
+        for (site, expected_e) in sites {
+            let rest = axes.iter().fold(site.model, |rest, axis| axis.without(&rest));
+            for expected_e in *expected_e {
+                let (law, adc) = (Law::of(&rest, expected_e), site.adc);
+                let blur_e = adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e));
+                let is_same = |kind: &Kind| kind.law == law && kind.adc == adc && kind.expected_e == expected_e;
+                let same = shared.kinds.iter().position(is_same).unwrap_or(shared.kinds.len());
+                shared.kinds.push(Kind { law, blur_e, expected_e, adc, same });
+            }
+        }
+        shared
     }
 
-    /// Responses to go through, with their weights.
-    fn gains(&self, sharp: Option<&AdcRecord>) -> Predicted<Vec<(f64, f64)>> {
-        let brightest = (0..3).max_by(|a, b| self.expected_e[*a].total_cmp(&self.expected_e[*b])).unwrap_or(0);
-        let (law, spread_e) = (&self.laws[brightest], self.expected_e[brightest] * self.response);
+    /// The mean readings of photosites of a line, each about the center that its law has.
+    fn means(&self, gained: &[Law], offset_e: f64) -> DVector<f64> {
+        let mut found = DVector::zeros(self.kinds.len());
+        for (k, Kind { law, adc, same, .. }) in self.kinds.iter().enumerate() {
+            found[k] = match adc {
+                _ if *same < k => found[*same],
+                // What is added to electrons is in them.
+                None => gained[k].expect(&law.of_electrons())[0] + offset_e,
+                Some(adc) => gained[k].expect(&Reading { offset_e, ..law.of_codes(adc, codes_of(adc)) })[0],
+            };
+        }
+        found
+    }
+
+    fn least_blur_e(&self) -> f64 {
+        self.kinds.iter().map(|kind| kind.blur_e).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Responses to go through, with their weights; codes follow them by steps where they are `sharp`.
+    fn gains(&self, is_sharp: bool) -> Predicted<Vec<(f64, f64)>> {
+        let Some(Kind { law, expected_e, .. }) = self.brightest() else { return Ok(vec![(0.0, 1.0)]) };
+        let spread_e = expected_e * self.response;
         // Brighter lines have more counts, whose law is smooth in the light whatever is read of each.
         if self.response == 0.0 || law.light.shot_std() > 0.0 {
             return Ok(nodes(spread_e, law.light.shot_std().hypot(self.least_blur_e())));
         }
-        let Some(adc) = sharp.filter(|_| self.offset_e == 0.0) else {
+        if !is_sharp || self.offset_e > 0.0 {
             let at_full = law.least_pattern_std().max(1.0);
             return Ok(nodes(spread_e, self.least_blur_e().hypot(self.offset_e).min(at_full)));
-        };
+        }
         let mut steps = Vec::new();
-        for k in 0..3 {
-            let spread_e = self.expected_e[k] * self.response;
-            let full = [self.laws[k].full_well_e];
-            let charge_e = self.laws[k].light.rate + self.laws[k].dark.rate;
-            let at = |level_e: f64| Step { at: (level_e - charge_e) / spread_e, width: self.blur_e[k] / spread_e };
-            steps
-                .extend(edges(adc, charge_e, REACH * spread_e + 9.0 * self.blur_e[k])?.into_iter().chain(full).map(at));
+        for Kind { law, blur_e, expected_e, adc, .. } in &self.kinds {
+            let spread_e = expected_e * self.response;
+            let charge_e = law.light.rate + law.dark.rate;
+            let at = |level_e: f64| Step { at: (level_e - charge_e) / spread_e, width: blur_e / spread_e };
+            let reach_e = REACH * spread_e + 9.0 * blur_e;
+            let edges = adc.as_ref().map_or(Ok(Vec::new()), |adc| edges(adc, charge_e, reach_e))?;
+            steps.extend(edges.into_iter().chain([law.full_well_e]).map(at));
         }
         stepped(steps)
     }
 
+    fn brightest(&self) -> Option<&Kind> {
+        self.kinds.iter().max_by(|a, b| a.expected_e.total_cmp(&b.expected_e))
+    }
+
     /// What is added, in standard deviations of it, with weights, where codes follow it by steps.
-    fn offsets(&self, adc: &AdcRecord, gained: &[Law; 3]) -> Predicted<Vec<(f64, f64)>> {
+    fn offsets(&self, gained: &[Law]) -> Predicted<Vec<(f64, f64)>> {
         if self.offset_e == 0.0 {
             return Ok(vec![(0.0, 1.0)]);
         }
         let mut steps = Vec::new();
         for (k, law) in gained.iter().enumerate() {
-            if gained[..k].contains(law) {
+            let Kind { blur_e, adc: Some(adc), .. } = &self.kinds[k] else { continue };
+            if (0..k).any(|other| gained[other] == *law && self.kinds[other].adc == Some(*adc)) {
                 continue;
             }
             for charge_e in charges(law, adc)? {
-                let at = |edge_e: f64| Step {
-                    at: (edge_e - charge_e) / self.offset_e,
-                    width: self.blur_e[k] / self.offset_e,
-                };
-                steps.extend(edges(adc, charge_e, REACH * self.offset_e + 9.0 * self.blur_e[k])?.into_iter().map(at));
+                let at = |edge_e: f64| Step { at: (edge_e - charge_e) / self.offset_e, width: blur_e / self.offset_e };
+                steps.extend(edges(adc, charge_e, REACH * self.offset_e + 9.0 * blur_e)?.into_iter().map(at));
                 too_many(steps.len())?;
             }
         }

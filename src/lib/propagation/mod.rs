@@ -57,6 +57,7 @@ mod spaces;
 mod steps;
 mod straight;
 mod tails;
+pub mod tap_lines;
 pub mod tapped;
 mod tapped_sampling;
 pub mod taps;
