@@ -256,24 +256,24 @@ impl PredictorSettings {
     /// pixels those behind each.
     fn of_taps(&self, head: &FrameHeader) -> Predicted<(FramePrediction, Causes)> {
         let prediction = of_frame(head, self.equations)?;
-        let mut budgets = Vec::new();
-        let mut counts = Vec::new();
-        for (tap, of_tap, sites) in Sites::of_taps(head, self.equations)? {
+        let (mut budgets, mut counts, mut means) = (Vec::new(), Vec::new(), Vec::new());
+        let all = Sites::of_taps(head, self.equations)?;
+        for (tap, of_tap, sites) in &all {
             let of_class = |e: f64| sites.photosite.causes(e);
             let [r, g, b] = sites.expected_e;
             let causes = [of_class(r)?, of_class(g)?, of_class(b)?];
             let is_curved = head.metadata.quantity == QuantityKind::Lab;
-            let means = sites.means_over_exposures(fixed_of(&causes), is_curved)?.moments;
-            budgets.push((tap, causes, means));
-            counts.push(of_tap);
+            means.push((*tap, sites.means_over_exposures(fixed_of(&causes), is_curved)?.moments));
+            budgets.push((*tap, causes));
+            counts.push(*of_tap);
         }
         let FramePrediction::Groups(whole) = &prediction else {
-            return Ok((prediction, Causes::Taps(budgets)));
+            return Ok((prediction, Causes::Taps(budgets, Box::new(Sites::over_exposures(&all, &means)?))));
         };
         let mut causes = [[0.0; Cause::ALL.len()]; 3];
         for (k, causes) in causes.iter_mut().enumerate() {
             let n: f64 = counts.iter().map(|counts| counts[k]).sum();
-            for (counts, (_, budgets, _)) in counts.iter().zip(&budgets) {
+            for (counts, (_, budgets)) in counts.iter().zip(&budgets) {
                 causes.iter_mut().zip(budgets[k]).for_each(|(sum, variance)| *sum += counts[k] * variance / n);
             }
         }

@@ -29,19 +29,6 @@ const MIXED_BY_TURNS: &str = "several amplifiers (`taps` of the sensor) have rea
 pub(super) const FLATTENED: &str = "it was divided by a flat field of a sensor that is read through several amplifiers (`taps`), and how their \
                          gains come off is not predicted";
 
-/// Why nothing is said of what rows and columns share.
-const WITH_LINES: &str = "its rows or columns share noise, and several amplifiers (`taps` of the sensor) read them; regions and crops \
-                          behind one of these are predicted";
-
-/// The same where no two columns beside each other are behind one amplifier.
-const LINES_BY_TURNS: &str = "its rows or columns share noise, and several amplifiers (`taps` of the sensor) read its columns by turns, of which \
-                              nothing is predicted but single columns before demosaicking";
-
-/// Why nothing is said of what rows and columns share on the sensor of a frame.
-pub(super) fn with_lines(frame: &FrameHeader) -> &'static str {
-    if are_by_turns(frame) { LINES_BY_TURNS } else { WITH_LINES }
-}
-
 /// Whether amplifiers read the columns of a frame by turns.
 pub(super) fn are_by_turns(frame: &FrameHeader) -> bool {
     frame.taps().is_some_and(|taps| taps.layout == TapLayout::Columns)
