@@ -628,8 +628,7 @@ fn pixels_of_several_taps_scatter_as_predicted() {
     let seeds = trials(1500);
     let mut smallest = 1.0_f64;
     let mut tests = 0;
-    let methods =
-        [Method::Bilinear, Method::EffectiveColor, Method::Malvar, Method::Bilinear, Method::EffectiveColor];
+    let methods = [Method::Bilinear, Method::EffectiveColor, Method::Malvar, Method::Bilinear, Method::EffectiveColor];
     let cases = several_taps().into_iter().zip(methods);
     let scenes: [fn([usize; 2], [f32; 3], &Taps) -> MemoryFrame; 2] = [tapped, tapped_with_lines];
     for ((taps, method), scene) in cases.flat_map(|case| scenes.map(|scene| (case.clone(), scene))) {
@@ -738,6 +737,40 @@ fn regions_of_taps_and_drift_scatter_as_predicted() {
     assert!(of_smallest(smallest, tests) > 1e-4, "{smallest} of {tests}");
 }
 
+/// The same where full well cuts off what rows and columns share, of photosites before demosaicking and of pixels: means scatter as
+/// predicted, and standard deviations lie about theirs.
+#[test]
+fn full_photosites_of_several_taps_scatter_as_predicted() {
+    let seeds = trials(1500);
+    for taps in [&several_taps()[1], &several_taps()[4]] {
+        let scene = tapped_with_lines([26, 22], [29_700.0, 29_000.0, 30_200.0], taps);
+        let part = [Region { x: 5, y: 3, width: 16, height: 15 }];
+        let mut laws = [Laws::default(), Laws::default(), Laws::default()];
+        let mut of = |seed: u64| {
+            let mut codes = digitized(&noisy(&scene, &settings(seed + 40_000)));
+            codes.header.metadata.noise.as_mut().unwrap().sensor_seed = 0;
+            let plane = plane_of(&codes);
+            let frames = [&codes, &plane, &demosaicked(&plane, Method::Bilinear)];
+            let mut found = Vec::new();
+            for (frame, laws) in frames.into_iter().zip(&mut laws) {
+                let report = regions_among(laws, frame, &part, Equations::Exact).remove(0);
+                found.extend(report.channels.into_iter().chain(report.classes));
+            }
+            found
+        };
+        let all: Vec<_> = (0..seeds).map(&mut of).collect();
+        let n = seeds as f64;
+        for index in 0..all[0].len() {
+            let z_mean = all.iter().map(|channels| channels[index].z_mean.unwrap());
+            let p = of_chi_square(z_mean.clone().map(|z| z * z).sum(), n);
+            assert!(p > 1e-6 && (z_mean.sum::<f64>() / n).abs() < 5.0 / n.sqrt(), "{:?} {index}: {p}", taps.layout);
+            // Roots of variances lie below that of their mean by a quarter of its relative variance, here 0.05 standard errors.
+            let z_std = all.iter().map(|channels| channels[index].z_std.unwrap()).sum::<f64>() / n;
+            assert!(z_std.abs() < 5.0 / n.sqrt() + 0.1, "{:?} {index}: {z_std}", taps.layout);
+        }
+    }
+}
+
 /// What is not predicted is refused with the key in the reason.
 #[test]
 fn what_taps_and_drift_leave_open_is_refused() {
@@ -806,12 +839,18 @@ fn taps_that_do_not_differ_predict_as_one() {
             let metadata = &scene.header.metadata;
             let setup = CameraSetup::new(metadata.sensor.clone().unwrap(), metadata.exposure.unwrap());
             let setup = CameraSetup { noise: settings(3), dark_frames: 3, method: Method::EffectiveColor, ..setup };
-            let settings =
-                PredictorSettings { patch: Some([7, 5]), color: Some(color_settings(Space::Xyz)), ..PredictorSettings::of(setup) };
+            let settings = PredictorSettings {
+                patch: Some([7, 5]),
+                color: Some(color_settings(Space::Xyz)),
+                ..PredictorSettings::of(setup)
+            };
             Predictor::new(settings).unwrap().predict(light.map(f64::from)).unwrap()
         };
         let close = |found: f64, expected: f64, what: &str| {
-            assert!((found - expected).abs() < 1e-12 * expected.abs().max(1.0), "{layout:?} {what}: {found} {expected}");
+            assert!(
+                (found - expected).abs() < 1e-12 * expected.abs().max(1.0),
+                "{layout:?} {what}: {found} {expected}"
+            );
         };
         let [found, wanted] = [&several, &alone].map(predicted);
         assert_eq!(found.stages.len(), 6);

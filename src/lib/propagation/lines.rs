@@ -435,7 +435,8 @@ impl LineTerms {
 
     /// The same of samples, of such signals and slopes to what is added to their lines and to what these have more of the light.
     pub fn between(&self, (x, [of_offsets, of_gains]): Site, (y, [with_offsets, with_gains]): Site) -> f64 {
-        of_offsets * with_offsets * (self.constant + self.linear * (x + y)) + of_gains * with_gains * self.square * x * y
+        of_offsets * with_offsets * (self.constant + self.linear * (x + y))
+            + of_gains * with_gains * self.square * x * y
     }
 
     /// Less what does not hang on signals.

@@ -88,12 +88,7 @@ impl PixelLines {
 
 impl PixelGains<{ 2 * PAIRS.len() }> {
     /// Those of what pairs of classes share in rows, then in columns.
-    fn of_lines(
-        table: &WeightTable,
-        at: [usize; 2],
-        geometry: &Geometry,
-        gain: impl Fn([isize; 2]) -> f64,
-    ) -> Self {
+    fn of_lines(table: &WeightTable, at: [usize; 2], geometry: &Geometry, gain: impl Fn([isize; 2]) -> f64) -> Self {
         let phase = phase_at(at, geometry);
         let class = |offset| table.class(phase, offset) as usize;
         let gained = |(offset, weight): ([isize; 2], f64)| {

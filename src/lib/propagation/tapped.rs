@@ -11,8 +11,8 @@ use super::moments::Prediction;
 use super::sampling::Sampling;
 use super::spaces::{Channels, Curved};
 use super::tap_lines::TapLines;
-pub use super::tapped_factors::OverExposures;
 use super::tapped_axis::Axis;
+pub use super::tapped_factors::OverExposures;
 use super::tapped_factors::{Factors, Loads, Site, first_order, loads, product};
 use super::taps::Group;
 use super::unpredictable::{Predicted, Unpredictable};
@@ -411,9 +411,9 @@ impl TappedPixels {
         });
         let of = |phase| {
             let own = gains::patch_mean_by_place(&self.array.weights, phase, size, variances);
-            let shared = shared.as_ref().map(|[rows, columns]| {
-                gains::patch_mean(&self.array.weights, phase, size).of_lines([rows, columns])
-            });
+            let shared = shared
+                .as_ref()
+                .map(|[rows, columns]| gains::patch_mean(&self.array.weights, phase, size).of_lines([rows, columns]));
             own + shared.unwrap_or_default()
         };
         let covariance = match phase {

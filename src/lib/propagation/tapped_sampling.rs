@@ -457,8 +457,8 @@ mod tests {
             close(sampling.mean_covariance[(i, j)], of_means, sampling.mean_covariance.diagonal().max());
             for (b, [k, l]) in PAIRS.into_iter().enumerate() {
                 let ((q, g), (r, h)) = (&forms[a], &forms[b]);
-                let more = g.dot(&(&second * h))
-                    + sum(&|s| third[s] * (q[s] * h[s] + g[s] * r[s]) + fourth[s] * q[s] * r[s]);
+                let more =
+                    g.dot(&(&second * h)) + sum(&|s| third[s] * (q[s] * h[s] + g[s] * r[s]) + fourth[s] * q[s] * r[s]);
                 let expected = (trace([i, k], [l, j]) + trace([i, l], [k, j]) + more) / (free * free);
                 close(sampling.spread[a][b], expected, (sampling.spread[a][a] * sampling.spread[b][b]).sqrt());
             }

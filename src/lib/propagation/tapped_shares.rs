@@ -156,7 +156,8 @@ impl Lines<'_> {
             let gram = &known[&lines];
             DMatrix::from_fn(rank, rank, |a, b| gram[(3 * a + channel, 3 * b + channel)] * values[b])
         };
-        let total = |line: usize| DVector::from_iterator(rank, self.total(line).iter().map(|(total, _)| total[channel]));
+        let total =
+            |line: usize| DVector::from_iterator(rank, self.total(line).iter().map(|(total, _)| total[channel]));
         powers.traces[0] += times * scaled([line, line]).trace();
         let mut further = DVector::zeros(rank);
         for near in self.near(line, far) {
@@ -195,8 +196,7 @@ impl<'a> Shares<'a> {
             let across = &pixels.array.axes[1 - axis];
             // Three rows of which each is within reach of one pixel with the next, and what such pixels are made of.
             let (first, kinds, examples) = across.kinds_around(reach, 4 * reach);
-            let mut lines =
-                Lines { axis, reach, factors: &factors[axis], first, kinds, examples, totals: Vec::new() };
+            let mut lines = Lines { axis, reach, factors: &factors[axis], first, kinds, examples, totals: Vec::new() };
             lines.add_totals(pixels);
             lines
         });
@@ -282,9 +282,8 @@ impl<'a> Shares<'a> {
             }
         }
         let count = self.pixels.array.axes.iter().map(|axis| axis.lines.len() as f64).product();
-        let powers = |powers: &[Powers; 3], total: &Matrix3<f64>| {
-            [0, 1, 2].map(|i| powers[i].projected(total[(i, i)], count))
-        };
+        let powers =
+            |powers: &[Powers; 3], total: &Matrix3<f64>| [0, 1, 2].map(|i| powers[i].projected(total[(i, i)], count));
         let powers = [powers(&of_row, &of_rows), powers(&of_column, &of_columns)];
         Nonlocal { total: of_rows + of_columns, products, row_products, powers }
     }

@@ -105,9 +105,8 @@ impl<'a> Samples<'a> {
             };
             own + row + column
         };
-        let of_channels = |i: usize, k: usize| {
-            DMatrix::from_fn(cells.len(), cells.len(), |a, b| entry(i, k, cells[a], cells[b]))
-        };
+        let of_channels =
+            |i: usize, k: usize| DMatrix::from_fn(cells.len(), cells.len(), |a, b| entry(i, k, cells[a], cells[b]));
         Block { times, covariances: std::array::from_fn(|pair| of_channels(pair / 3, pair % 3)) }
     }
 
@@ -254,7 +253,8 @@ mod tests {
     fn sites(by: f64, is_plane: bool) -> TappedSites {
         let lines = lines(6, by, if is_plane { 0.0 } else { 0.1 });
         let (rows, columns) = (vec![3.0, 2.0, 2.0, 4.0], vec![2.0, 1.0, 3.0, 2.0, 2.0, 1.0]);
-        let class = |row: usize, column: usize| [[Class::Red, Class::Green], [Class::Green, Class::Blue]][row % 2][column % 2];
+        let class =
+            |row: usize, column: usize| [[Class::Red, Class::Green], [Class::Green, Class::Blue]][row % 2][column % 2];
         let cell = |row: usize, column: usize| Cell {
             row,
             column,
@@ -264,12 +264,10 @@ mod tests {
         let all = (0..4).flat_map(|row| (0..6).map(move |column| cell(row, column))).collect();
         let cells = Cells { rows, columns, all, are_by_turns: true };
         let count = |of: usize, k: usize| -> f64 {
-            let is_here =
-                |cell: &&Cell| cell.group == of && cell.class.is_none_or(|class| class as usize == k);
+            let is_here = |cell: &&Cell| cell.group == of && cell.class.is_none_or(|class| class as usize == k);
             cells.all.iter().filter(is_here).map(|cell| cells.count(cell)).sum()
         };
-        let groups =
-            (0..6).map(|index| group(index, &lines, by, [0, 1, 2].map(|k| count(index, k)))).collect();
+        let groups = (0..6).map(|index| group(index, &lines, by, [0, 1, 2].map(|k| count(index, k)))).collect();
         TappedSites { groups, lines: Some(Box::new(lines)), cells }
     }
 
@@ -330,7 +328,10 @@ mod tests {
                             };
                             let own = samples.own(places[s].1, i, i);
                             let fourth = kept * kept * site(s, i).fourth_of_own(own);
-                            third([i, j, l], k) + third([i, j, k], l) + third([j, k, l], i) + third([i, k, l], j)
+                            third([i, j, l], k)
+                                + third([i, j, k], l)
+                                + third([j, k, l], i)
+                                + third([i, k, l], j)
                                 + if is_one(s, &[i, j, k, l]) { fourth } else { 0.0 }
                         })
                         .sum();
