@@ -5,7 +5,8 @@ use crate::metadata::FrameHeader;
 use crate::propagation::budget::{Budget, Cause};
 use crate::propagation::frame::{FixedPart, Predicted, Sites};
 use crate::propagation::gains;
-use crate::propagation::{Equations, FramePrediction, PixelMoments, Prediction, TappedPixels};
+use crate::propagation::tapped::OverExposures;
+use crate::propagation::{Equations, FramePrediction, PixelMoments, TappedPixels};
 use nalgebra::Matrix3;
 
 /// Variances of photosites by cause.
@@ -15,7 +16,7 @@ pub(super) enum Causes {
     /// The same with what of the pixels that are made of them is the same in every exposure.
     Pixels(Box<([Budget; 3], FixedPart)>),
     /// The same behind each amplifier, and the means that their photosites have over exposures.
-    Taps(Vec<(usize, [Budget; 3], [Prediction; 3])>),
+    Taps(Vec<(usize, [Budget; 3])>, Box<OverExposures>),
 }
 
 impl Causes {
@@ -43,7 +44,9 @@ impl Causes {
             (Self::Classes(causes), FramePrediction::Planes(_) | FramePrediction::Groups(_)) => {
                 each(|cause| [0, 1, 2].map(|class| causes[class][cause as usize]))
             }
-            (Self::Taps(budgets), FramePrediction::Tapped(pixels)) => of_tapped(pixels, budgets, covariance),
+            (Self::Taps(budgets, means), FramePrediction::Tapped(pixels)) => {
+                of_tapped(pixels, budgets, means, covariance)
+            }
             _ => Vec::new(),
         }
     }
@@ -82,17 +85,7 @@ fn of_pixels(
     let first_order = gains.of(&sites);
     let has_lines = found.iter().any(|entry| entry.cause.shared_by().is_some() && entry.variance != [0.0; 3]);
     if has_lines || !sites.is_independent() {
-        // What is curved in what rows and columns share: of what is drawn anew in each exposure, and of what is not.
-        let anew = first_order - fixed.first_order;
-        let parts = [(false, curving(causes), anew), (true, Cause::ClippedPattern, fixed.first_order)];
-        for (is_fixed, cause, part) in parts {
-            let of_part = || found.iter().filter(|entry| entry.cause.is_fixed_pattern() == is_fixed);
-            let left = [0, 1, 2].map(|i| part[(i, i)] - of_part().map(|entry| entry.variance[i]).sum::<f64>());
-            if (0..3).any(|i| left[i].abs() > 1e-9 * first_order[(i, i)]) {
-                let variance = &mut found[cause as usize].variance;
-                variance.iter_mut().zip(left).for_each(|(variance, left)| *variance += left);
-            }
-        }
+        add_curved_lines(&mut found, curving(causes), &first_order, &fixed.first_order);
     }
     let all = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i].abs()).sum::<f64>());
     let [pattern, whole] = [fixed.covariance - fixed.first_order, covariance - first_order];
@@ -101,6 +94,19 @@ fn of_pixels(
     found[Cause::CurvedPattern as usize].variance = of_pattern;
     found[Cause::Curvature as usize].variance = [0, 1, 2].map(|i| whole[(i, i)] - of_pattern[i]);
     found
+}
+
+/// Adds what is curved in what rows and columns share: of what is drawn anew in each exposure, and of what is not.
+fn add_curved_lines(found: &mut [CauseVariance], curving: Cause, first_order: &Matrix3<f64>, fixed: &Matrix3<f64>) {
+    let parts = [(false, curving, first_order - fixed), (true, Cause::ClippedPattern, *fixed)];
+    for (is_fixed, cause, part) in parts {
+        let of_part = || found.iter().filter(|entry| entry.cause.is_fixed_pattern() == is_fixed);
+        let left = [0, 1, 2].map(|i| part[(i, i)] - of_part().map(|entry| entry.variance[i]).sum::<f64>());
+        if (0..3).any(|i| left[i].abs() > 1e-9 * first_order[(i, i)]) {
+            let variance = &mut found[cause as usize].variance;
+            variance.iter_mut().zip(left).for_each(|(variance, left)| *variance += left);
+        }
+    }
 }
 
 /// What makes photosites follow what they share on a curve.
@@ -112,21 +118,25 @@ fn curving(causes: &[Budget; 3]) -> Cause {
 /// What is between places of pixels that several amplifiers have a part in is theirs.
 fn of_tapped(
     pixels: &TappedPixels,
-    budgets: &[(usize, [Budget; 3], [Prediction; 3])],
+    budgets: &[(usize, [Budget; 3])],
+    means: &OverExposures,
     covariance: &Matrix3<f64>,
 ) -> Vec<CauseVariance> {
-    let of_tap = |tap: usize| budgets.iter().find(|(of, ..)| *of == tap);
+    let of_tap = |tap: usize| budgets.iter().find(|(of, _)| *of == tap);
     let mut found = each(|cause| {
-        let of_site =
-            |tap: usize, class: usize| of_tap(tap).map_or(0.0, |(_, causes, _)| causes[class][cause as usize]);
-        pixels.within(of_site).diagonal().into()
+        let of_site = |tap: usize, class: usize| of_tap(tap).map_or(0.0, |(_, causes)| causes[class][cause as usize]);
+        pixels.within(cause.shared_by(), of_site).diagonal().into()
     });
+    if pixels.has_lines() {
+        let (first_order, fixed) = (pixels.first_order(), pixels.fixed(means));
+        let curving = budgets.first().map_or(Cause::Quantization, |(_, causes)| curving(causes));
+        add_curved_lines(&mut found, curving, &first_order, &fixed);
+    }
     let between = pixels.between();
     let told = [0, 1, 2].map(|i| found.iter().map(|entry| entry.variance[i]).sum::<f64>() + between[(i, i)]);
     found[Cause::Taps as usize].variance = between.diagonal().into();
     if pixels.bias != [0.0; 3] {
-        let none = Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0);
-        let of_pattern = pixels.curved_pattern(|tap, class| of_tap(tap).map_or(none, |(_, _, means)| means[class]));
+        let of_pattern = pixels.curved_pattern(means);
         found[Cause::CurvedPattern as usize].variance = of_pattern.diagonal().into();
         found[Cause::Curvature as usize].variance =
             [0, 1, 2].map(|i| covariance[(i, i)] - told[i] - of_pattern[(i, i)]);

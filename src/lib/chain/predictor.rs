@@ -21,7 +21,7 @@ use crate::propagation::gains;
 use crate::propagation::ground::{has_tails, quantity_of_sites};
 use crate::propagation::saturation;
 use crate::propagation::smooth_hue::FirstOrder;
-use crate::propagation::taps::{Group, pooled};
+use crate::propagation::taps::pooled;
 use crate::propagation::{Equations, FramePrediction, SiteCovariance, of_frame};
 use crate::stages::demosaic::Method;
 use crate::stages::demosaic::stencil::PHASES;
@@ -256,28 +256,28 @@ impl PredictorSettings {
     /// pixels those behind each.
     fn of_taps(&self, head: &FrameHeader) -> Predicted<(FramePrediction, Causes)> {
         let prediction = of_frame(head, self.equations)?;
-        let mut budgets = Vec::new();
-        let mut counts = Vec::new();
-        for (tap, of_tap, sites) in Sites::of_taps(head, self.equations)? {
+        let (mut budgets, mut counts, mut means) = (Vec::new(), Vec::new(), Vec::new());
+        let all = Sites::of_taps(head, self.equations)?;
+        for (tap, of_tap, sites) in &all {
             let of_class = |e: f64| sites.photosite.causes(e);
             let [r, g, b] = sites.expected_e;
             let causes = [of_class(r)?, of_class(g)?, of_class(b)?];
             let is_curved = head.metadata.quantity == QuantityKind::Lab;
-            let means = sites.means_over_exposures(fixed_of(&causes), is_curved)?.moments;
-            budgets.push((tap, causes, means));
-            counts.push(of_tap);
+            means.push((*tap, sites.means_over_exposures(fixed_of(&causes), is_curved)?.moments));
+            budgets.push((*tap, causes));
+            counts.push(*of_tap);
         }
-        let FramePrediction::Groups(groups) = &prediction else {
-            return Ok((prediction, Causes::Taps(budgets)));
+        let FramePrediction::Groups(whole) = &prediction else {
+            return Ok((prediction, Causes::Taps(budgets, Box::new(Sites::over_exposures(&all, &means)?))));
         };
         let mut causes = [[0.0; Cause::ALL.len()]; 3];
         for (k, causes) in causes.iter_mut().enumerate() {
             let n: f64 = counts.iter().map(|counts| counts[k]).sum();
-            for (counts, (_, budgets, _)) in counts.iter().zip(&budgets) {
+            for (counts, (_, budgets)) in counts.iter().zip(&budgets) {
                 causes.iter_mut().zip(budgets[k]).for_each(|(sum, variance)| *sum += counts[k] * variance / n);
             }
         }
-        for (causes, class) in causes.iter_mut().zip(pooled(groups)) {
+        for (causes, class) in causes.iter_mut().zip(pooled(&whole.groups)) {
             causes[Cause::Taps as usize] = class.moments.variance - causes.iter().sum::<f64>();
         }
         Ok((prediction, Causes::Classes(Box::new(causes))))
@@ -361,22 +361,8 @@ impl PredictorSettings {
                 let sites = SiteCovariance::of(classes);
                 (classes.map(|class| class.moments.mean), sites.own_of_planes() + sites.row + sites.column)
             }
-            FramePrediction::Groups(groups) => {
-                let classes = pooled(groups);
-                let mean = classes.map(|class| class.moments.mean);
-                // Amplifiers move the classes together, but for those of a plane, which are other photosites.
-                let is_plane = groups.iter().any(|group| group.counts[0] != group.counts[1]);
-                let n: f64 = groups.iter().map(|group| group.counts[0]).sum();
-                let off = |group: &Group, i: usize| group.sites[i].moments.mean - mean[i];
-                let between = |i: usize, j: usize| {
-                    groups.iter().map(|group| group.counts[0] * off(group, i) * off(group, j)).sum::<f64>() / n
-                };
-                let covariance = |i: usize, j: usize| match i == j {
-                    true => classes[i].moments.variance,
-                    false if is_plane => 0.0,
-                    false => between(i, j),
-                };
-                (mean, Matrix3::from_fn(covariance))
+            FramePrediction::Groups(sites) => {
+                (pooled(&sites.groups).map(|class| class.moments.mean), sites.covariance())
             }
             FramePrediction::Pixels(mixture) if self.equations == Equations::Paper => {
                 (mixture.mean, mixture.covariance)
@@ -436,15 +422,7 @@ impl PredictorSettings {
                 let phase = self.patch_at.map(|[x, y]| crate::stages::demosaic::stencil::phase(x, y));
                 pixels.patch_mean(phase, size)
             }
-            // Photosites of any place: what they have behind an amplifier, on average.
-            FramePrediction::Groups(groups) => {
-                let n = size[0] as f64 * size[1] as f64;
-                let within = |k: usize| {
-                    let all: f64 = groups.iter().map(|group| group.counts[k]).sum();
-                    groups.iter().map(|group| group.counts[k] * group.sites[k].moments.variance).sum::<f64>() / all
-                };
-                Matrix3::from_diagonal(&[0, 1, 2].map(|k| within(k) / n).into())
-            }
+            FramePrediction::Groups(sites) => sites.patch_mean(size),
             FramePrediction::Pixels(_) => covariance / (size[0] as f64 * size[1] as f64),
         }
     }

@@ -6,7 +6,7 @@
 use super::curved;
 use super::gains;
 use super::ground::{Ground, quantity_of_sites, subtracted};
-use super::lines::DRIFTING;
+use super::lines::{DRIFTING, TAPPED_DRIFT};
 use super::moments::LineCovariance;
 use super::moments::{Equations, Prediction, SiteCovariance};
 use super::photosite::Photosite;
@@ -14,12 +14,13 @@ use super::pixel_moments::PixelMoments;
 use super::repeated;
 use super::spaces::{Channels, Curved, OTHER_COLORS, is_curved, white};
 use super::tails;
-use super::tapped::TappedPixels;
-use super::taps::{self, Group};
+use super::tap_lines::{Lit, TapLines};
+use super::tapped::{OverExposures, TappedPixels};
+use super::taps::{self, Group, TappedSites};
 use super::unpredictable::{OFFSETS_TOO_LONG, TOO_LONG};
 pub use super::unpredictable::{Predicted, Unpredictable};
 use crate::color;
-use crate::metadata::FrameHeader;
+use crate::metadata::{AverageRecord, FrameHeader};
 use crate::names::Named;
 use crate::stages::demosaic::Method;
 use crate::units::QuantityKind;
@@ -32,7 +33,7 @@ pub enum FramePrediction {
     /// Classes that are drawn apart: R, G and B before demosaicking.
     Planes([Prediction; 3]),
     /// Such classes in groups, one for each of the amplifiers that have read the frame.
-    Groups(Vec<Group>),
+    Groups(TappedSites),
     /// Pixels that are weighted sums of photosites.
     Pixels(Box<PixelMoments>),
     /// Such pixels where several amplifiers have read their photosites.
@@ -89,9 +90,12 @@ pub enum FramePrediction {
 /// # Ok::<(), cyanometer::error::Error>(())
 /// ```
 pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePrediction> {
-    let moments = |frame: &FrameHeader, equations| Ok(Sites::of(frame, equations)?.moments);
-    if let Some(groups) = taps::groups(frame, equations, moments)? {
-        return Ok(FramePrediction::Groups(groups));
+    let of_one = |frame: &FrameHeader, equations| {
+        let sites = Sites::of(frame, equations)?;
+        Ok((sites.lit(), sites.moments, sites.average(frame)?))
+    };
+    if let Some(sites) = taps::sites(frame, equations, of_one)? {
+        return Ok(FramePrediction::Groups(sites));
     }
     if taps::are_mixed(frame) {
         return Ok(FramePrediction::Tapped(Box::new(tapped(frame, equations)?)));
@@ -160,6 +164,16 @@ impl Sites {
         Ok(sites)
     }
 
+    fn lit(&self) -> Lit {
+        (self.photosite, self.expected_e)
+    }
+
+    /// How the exposures were averaged that the frame of these photosites is made of; none where it is one exposure.
+    fn average(&self, frame: &FrameHeader) -> Predicted<Option<AverageRecord>> {
+        let of_sites = quantity_of_sites(frame);
+        frame.metadata.average.as_ref().map(|record| repeated::average_of(frame, record, of_sites)).transpose()
+    }
+
     /// Refuses frames whose photosites no formula tells, as far as that is known before anything is worked out.
     ///
     /// # Errors
@@ -181,6 +195,21 @@ impl Sites {
     pub fn of_taps(frame: &FrameHeader, equations: Equations) -> Predicted<Vec<(usize, [f64; 3], Self)>> {
         let parts = taps::parts(frame).into_iter();
         parts.map(|part| Ok((part.tap, part.counts, Self::of(&part.frame, equations)?))).collect()
+    }
+
+    /// The means that photosites of amplifiers have over exposures, which have such moments.
+    ///
+    /// # Errors
+    ///
+    /// As [`of_frame`].
+    pub fn over_exposures(
+        taps: &[(usize, [f64; 3], Self)],
+        means: &[(usize, [Prediction; 3])],
+    ) -> Predicted<OverExposures> {
+        let lit: Vec<Lit> = taps.iter().map(|(_, _, sites)| sites.lit()).collect();
+        let has_lines = lit.iter().any(|(photosite, _)| photosite.has_lines());
+        let lines = if has_lines { Some(TapLines::fixed(&lit)?) } else { None };
+        Ok(OverExposures::of(means, lines.as_ref()))
     }
 
     /// Predicts a frame that was made of these photosites; pixels say where their moments are void.
@@ -326,21 +355,23 @@ fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> 
     if Method::named(&record.method) == Some(Method::SmoothHue) {
         return beyond(if taps::are_by_turns(frame) { BY_HUE_BY_TURNS } else { BY_HUE });
     }
-    let mut groups = Vec::new();
+    let (mut groups, mut lit, mut average) = (Vec::new(), Vec::new(), None);
     for part in taps::parts(&taps::with_footprint(frame)) {
         let of_tap = FrameHeader { geometry: frame.geometry.clone(), ..part.frame };
         let sites = Sites::of(&of_tap, equations)?;
         if sites.photosite.drifts() {
-            return beyond(DRIFTING);
-        }
-        if sites.moments.iter().any(|site| site.lines != LineCovariance::default()) {
-            return beyond(taps::with_lines(frame));
+            return beyond(TAPPED_DRIFT);
         }
         if sites.photosite.has_tails() && is_curved(metadata.quantity) {
             return beyond(tails::CURVED);
         }
+        lit.push(sites.lit());
+        average = sites.average(&of_tap)?;
         groups.push((part.tap, Group { counts: part.counts, sites: sites.moments }));
     }
+    let moments: Vec<[Prediction; 3]> = groups.iter().map(|(_, group)| group.sites).collect();
+    let is_shared = moments.iter().flatten().any(|site| site.lines != LineCovariance::default());
+    let lines = if is_shared { TapLines::of(&lit, &moments, average.as_ref())? } else { None };
     let black = subtracted(record.black, record.black_deltas)?;
-    TappedPixels::of(frame, &Channels::of(metadata, quantity_of_sites(frame))?, black, &groups)
+    TappedPixels::of(frame, &Channels::of(metadata, quantity_of_sites(frame))?, black, &groups, lines.as_ref())
 }

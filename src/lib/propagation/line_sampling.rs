@@ -153,16 +153,16 @@ struct AxisSums {
 
 /// Sums over the pixels of a place of what one channel of them shares, r = C1 its row sums.
 #[derive(Debug, Clone, Copy, Default)]
-struct Powers {
+pub(super) struct Powers {
     /// tr C, tr C² and tr C³.
-    traces: [f64; 3],
+    pub traces: [f64; 3],
     /// r·r and r·Cr.
-    of_row_sums: [f64; 2],
+    pub of_row_sums: [f64; 2],
 }
 
 impl Powers {
     /// tr (PC)ᵏ, P the projection that takes the mean of so many pixels off.
-    fn projected(&self, total: f64, count: f64) -> [f64; 3] {
+    pub fn projected(&self, total: f64, count: f64) -> [f64; 3] {
         let [one, two, three] = self.traces;
         let [square, cube] = self.of_row_sums;
         let mean = total / count;

@@ -6,7 +6,6 @@
 //! noise, or what is added, blurs it.
 
 use super::blur::blur_e;
-use super::covariance::PAIRS;
 use super::effort;
 use super::law::Law;
 use super::line_means::{Kinds, LineMeans};
@@ -18,7 +17,7 @@ use crate::metadata::AdcRecord;
 use crate::numerics::gauss::panel;
 use crate::numerics::normal::density;
 use crate::stages::noise::NoiseModel;
-use nalgebra::Matrix3;
+use nalgebra::{DMatrix, DVector, Matrix3};
 
 /// Values of what is shared that are gone through at most where codes follow it by steps.
 const MOST_STEPPED: usize = 6000;
@@ -43,17 +42,25 @@ struct Step {
     width: f64,
 }
 
-/// What rows or columns share, or both.
+/// What rows or columns share, or both, of photosites of some classes: of R, G and B, of one amplifier or of several.
 struct Shared {
     /// What is added to the charge, e⁻.
     offset_e: f64,
     /// Relative response.
     response: f64,
-    /// What is a photosite's own, or other lines', by class: all kinds.
-    kinds: [Kinds; 3],
-    /// What of that blurs codes, e⁻, by class.
-    blur_e: [f64; 3],
-    expected_e: [f64; 3],
+    classes: Vec<Class>,
+}
+
+/// Photosites of one class behind one amplifier.
+struct Class {
+    /// What is a photosite's own, or other lines'.
+    kinds: Kinds,
+    /// What of that blurs codes, e⁻.
+    blur_e: f64,
+    expected_e: f64,
+    adc: Option<AdcRecord>,
+    /// The first class that is the same.
+    same: usize,
 }
 
 impl Photosite {
@@ -63,76 +70,8 @@ impl Photosite {
     ///
     /// [`Unpredictable::Beyond`] where they are too many.
     pub(super) fn curved(&self, axes: &[Axis], expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
-        let found = effort::within(MOST_WORK, || self.curved_within(axes, expected_e));
-        found.unwrap_or(Err(Unpredictable::Beyond(TAKES_LONG)))
-    }
-
-    fn curved_within(&self, axes: &[Axis], expected_e: [f64; 3]) -> Predicted<Matrix3<f64>> {
-        let part = |model: &NoiseModel| axes.iter().fold(*model, |rest, axis| axis.without(&rest));
-        let rest = part(&self.model);
-        let [mut offset_e, mut response] = [0.0_f64; 2];
-        for axis in axes {
-            let [temporal, fixed, of_response] = axis.parts(&self.model.lines);
-            offset_e = offset_e.hypot(temporal.hypot(fixed));
-            response = response.hypot(of_response);
-        }
-        if offset_e == 0.0 && response == 0.0 {
-            return Ok(Matrix3::zeros());
-        }
-        let of_class = |expected_e: f64| {
-            let blur = |adc: AdcRecord| blur_e(&rest, &adc, expected_e);
-            // Of hot photosites that are full nothing blurs codes but what is added.
-            self.adc.map_or(f64::INFINITY, blur).min(if rest.tails.has_hot() { rest.added() } else { f64::INFINITY })
-        };
-        let kinds = expected_e.map(|expected_e| self.kinds_of_line(expected_e, part));
-        let shared = Shared { offset_e, response, kinds, blur_e: expected_e.map(of_class), expected_e };
-        let mut gains = shared.gains(None)?;
-        let smooth = nodes(offset_e, shared.least_blur_e());
-        let sharp = self.adc.filter(|_| smooth.len() * gains.len() > MOST_NODES);
-        if sharp.is_some() && self.has_tails() {
-            return Err(Unpredictable::Beyond(COARSE_LINES));
-        }
-        if let Some(adc) = &sharp {
-            gains = shared.gains(Some(adc))?;
-        } else if smooth.len() * gains.len() > MOST_NODES {
-            return Err(Unpredictable::Beyond(TOO_COARSE));
-        }
-        let (mut first, mut second) = ([0.0; 3], [0.0; 6]);
-        let mut all = 0;
-        let mut foreseen: Option<effort::Foreseen> = None;
-        let count = gains.len();
-        for (u, of_u) in gains {
-            let gained = shared.kinds.each_ref().map(|kinds| kinds.gained(1.0 + response * u));
-            let lines = shared.lines(&gained, self.adc);
-            let offsets = match &sharp {
-                Some(adc) => &shared.offsets(adc, &gained)?,
-                None => &smooth,
-            };
-            all += offsets.len();
-            if all > MOST_STEPPED {
-                return Err(Unpredictable::Beyond(TOO_COARSE));
-            }
-            let foreseen = foreseen.get_or_insert_with(|| effort::Foreseen::of(count * offsets.len()));
-            for (v, of_v) in offsets {
-                foreseen.begin_next();
-                if effort::is_spent() {
-                    return Err(Unpredictable::Beyond(TAKES_LONG));
-                }
-                let means = shared.means(&lines, offset_e * v);
-                for (sum, mean) in first.iter_mut().zip(means) {
-                    *sum += of_u * of_v * mean;
-                }
-                for (sum, [k, l]) in second.iter_mut().zip(PAIRS) {
-                    *sum += of_u * of_v * means[k] * means[l];
-                }
-            }
-        }
-        let mut found = Matrix3::zeros();
-        for (square, [k, l]) in second.into_iter().zip(PAIRS) {
-            found[(k, l)] = square - first[k] * first[l];
-            found[(l, k)] = found[(k, l)];
-        }
-        Ok(found)
+        let found = curved(&[(*self, expected_e)], axes)?;
+        Ok(Matrix3::from_fn(|k, l| found[(k, l)]))
     }
 
     /// What three samples of one place, each of its class, share by row and column together beyond what they share by either: where
@@ -153,71 +92,154 @@ impl Photosite {
     }
 }
 
+/// Covariances of photosites that share such lines, of R, G and B of each of several amplifiers one after the other, by sums over what
+/// these share; the amplifiers are those of one sensor.
+///
+/// # Errors
+///
+/// [`Unpredictable::Beyond`] where they are too many.
+pub(super) fn curved(sites: &[(Photosite, [f64; 3])], axes: &[Axis]) -> Predicted<DMatrix<f64>> {
+    let found = effort::within(MOST_WORK, || curved_within(sites, axes));
+    found.unwrap_or(Err(Unpredictable::Beyond(TAKES_LONG)))
+}
+
+fn curved_within(sites: &[(Photosite, [f64; 3])], axes: &[Axis]) -> Predicted<DMatrix<f64>> {
+    let shared = Shared::of(sites, axes);
+    let count = shared.classes.len();
+    if shared.offset_e == 0.0 && shared.response == 0.0 {
+        return Ok(DMatrix::zeros(count, count));
+    }
+    let mut gains = shared.gains(false)?;
+    let smooth = nodes(shared.offset_e, shared.least_blur_e());
+    let are_many = smooth.len() * gains.len() > MOST_NODES;
+    let is_sharp = are_many && shared.classes.iter().all(|class| class.adc.is_some());
+    if is_sharp && sites.iter().any(|(site, _)| site.has_tails()) {
+        return Err(Unpredictable::Beyond(COARSE_LINES));
+    }
+    if is_sharp {
+        gains = shared.gains(true)?;
+    } else if are_many {
+        return Err(Unpredictable::Beyond(TOO_COARSE));
+    }
+    let (mut first, mut second) = (DVector::zeros(count), DMatrix::zeros(count, count));
+    let mut all = 0;
+    let mut foreseen: Option<effort::Foreseen> = None;
+    let lines = gains.len();
+    for (u, of_u) in gains {
+        let share = 1.0 + shared.response * u;
+        let gained: Vec<Kinds> = shared.classes.iter().map(|class| class.kinds.gained(share)).collect();
+        let means = shared.line(&gained);
+        let offsets = if is_sharp { &shared.offsets(&gained)? } else { &smooth };
+        all += offsets.len();
+        if all > MOST_STEPPED {
+            return Err(Unpredictable::Beyond(TOO_COARSE));
+        }
+        let foreseen = foreseen.get_or_insert_with(|| effort::Foreseen::of(lines * offsets.len()));
+        for (v, of_v) in offsets {
+            foreseen.begin_next();
+            if effort::is_spent() {
+                return Err(Unpredictable::Beyond(TAKES_LONG));
+            }
+            let means = shared.means(&means, shared.offset_e * v);
+            first += of_u * of_v * &means;
+            second += of_u * of_v * &means * means.transpose();
+        }
+    }
+    Ok(second - &first * first.transpose())
+}
+
 impl Shared {
-    /// The photosites of a line, by class, each about the center that the law of most has.
-    fn lines(&self, gained: &[Kinds; 3], adc: Option<AdcRecord>) -> [LineMeans; 3] {
-        [0, 1, 2].map(|k| LineMeans::of(&gained[k], self.kinds[k].most(), adc, self.blur_e[k]))
+    fn of(sites: &[(Photosite, [f64; 3])], axes: &[Axis]) -> Self {
+        let mut shared = Self { offset_e: 0.0, response: 0.0, classes: Vec::new() };
+        if let Some((site, _)) = sites.first() {
+            for axis in axes {
+                let [temporal, fixed, of_response] = axis.parts(&site.model.lines);
+                shared.offset_e = shared.offset_e.hypot(temporal.hypot(fixed));
+                shared.response = shared.response.hypot(of_response);
+            }
+        }
+        let part = |model: &NoiseModel| axes.iter().fold(*model, |rest, axis| axis.without(&rest));
+        for (site, expected_e) in sites {
+            let rest = part(&site.model);
+            // Of hot photosites that are full nothing blurs codes but what is added.
+            let of_full_e = if rest.tails.has_hot() { rest.added() } else { f64::INFINITY };
+            for expected_e in *expected_e {
+                let (kinds, adc) = (site.kinds_of_line(expected_e, part), site.adc);
+                let blur_e = adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e).min(of_full_e));
+                let is_same =
+                    |class: &Class| class.kinds == kinds && class.adc == adc && class.expected_e == expected_e;
+                let same = shared.classes.iter().position(is_same).unwrap_or(shared.classes.len());
+                shared.classes.push(Class { kinds, blur_e, expected_e, adc, same });
+            }
+        }
+        shared
     }
 
-    /// The mean samples of photosites of a line.
-    fn means(&self, lines: &[LineMeans; 3], offset_e: f64) -> [f64; 3] {
-        let mean = |k: usize| lines[k].at(offset_e);
-        let same = |k: usize, other: usize| self.expected_e[k] == self.expected_e[other];
-        let of_red = mean(0);
-        let of_green = if same(1, 0) { of_red } else { mean(1) };
-        let of_blue = match [same(2, 0), same(2, 1)] {
-            [true, _] => of_red,
-            [_, true] => of_green,
-            _ => mean(2),
+    /// The photosites of a line, by class, each about the center that the law of most has; none where another is the same.
+    fn line(&self, gained: &[Kinds]) -> Vec<Option<LineMeans>> {
+        let of_class = |(k, class): (usize, &Class)| {
+            (class.same == k).then(|| LineMeans::of(&gained[k], class.kinds.most(), class.adc, class.blur_e))
         };
-        [of_red, of_green, of_blue]
+        self.classes.iter().enumerate().map(of_class).collect()
+    }
+
+    /// Their mean samples, where so much is added.
+    fn means(&self, line: &[Option<LineMeans>], offset_e: f64) -> DVector<f64> {
+        let mut found = DVector::zeros(self.classes.len());
+        for (k, means) in line.iter().enumerate() {
+            found[k] = means.as_ref().map_or(found[self.classes[k].same], |means| means.at(offset_e));
+        }
+        found
     }
 
     fn least_blur_e(&self) -> f64 {
-        self.blur_e.into_iter().fold(f64::INFINITY, f64::min)
+        self.classes.iter().map(|class| class.blur_e).fold(f64::INFINITY, f64::min)
     }
 
-    /// Responses to go through, with their weights.
-    fn gains(&self, sharp: Option<&AdcRecord>) -> Predicted<Vec<(f64, f64)>> {
-        let brightest = (0..3).max_by(|a, b| self.expected_e[*a].total_cmp(&self.expected_e[*b])).unwrap_or(0);
-        let (law, spread_e) = (self.kinds[brightest].most(), self.expected_e[brightest] * self.response);
+    /// Responses to go through, with their weights; codes follow them by steps where they are `sharp`.
+    fn gains(&self, is_sharp: bool) -> Predicted<Vec<(f64, f64)>> {
+        let Some(Class { kinds, expected_e, .. }) = self.brightest() else { return Ok(vec![(0.0, 1.0)]) };
+        let law = kinds.most();
+        let spread_e = expected_e * self.response;
         // Brighter lines have more counts, whose law is smooth in the light whatever is read of each.
         if self.response == 0.0 || law.light.shot_std() > 0.0 {
             return Ok(nodes(spread_e, law.light.shot_std().hypot(self.least_blur_e())));
         }
-        let Some(adc) = sharp.filter(|_| self.offset_e == 0.0) else {
+        if !is_sharp || self.offset_e > 0.0 {
             let at_full = law.least_pattern_std().max(1.0);
             return Ok(nodes(spread_e, self.least_blur_e().hypot(self.offset_e).min(at_full)));
-        };
+        }
         let mut steps = Vec::new();
-        for k in 0..3 {
-            let spread_e = self.expected_e[k] * self.response;
-            let law = self.kinds[k].most();
-            let full = [law.full_well_e];
+        for Class { kinds, blur_e, expected_e, adc, .. } in &self.classes {
+            let law = kinds.most();
+            let spread_e = expected_e * self.response;
             let charge_e = law.light.rate + law.dark.rate;
-            let at = |level_e: f64| Step { at: (level_e - charge_e) / spread_e, width: self.blur_e[k] / spread_e };
-            steps
-                .extend(edges(adc, charge_e, REACH * spread_e + 9.0 * self.blur_e[k])?.into_iter().chain(full).map(at));
+            let at = |level_e: f64| Step { at: (level_e - charge_e) / spread_e, width: blur_e / spread_e };
+            let reach_e = REACH * spread_e + 9.0 * blur_e;
+            let edges = adc.as_ref().map_or(Ok(Vec::new()), |adc| edges(adc, charge_e, reach_e))?;
+            steps.extend(edges.into_iter().chain([law.full_well_e]).map(at));
         }
         stepped(steps)
     }
 
+    fn brightest(&self) -> Option<&Class> {
+        self.classes.iter().max_by(|a, b| a.expected_e.total_cmp(&b.expected_e))
+    }
+
     /// What is added, in standard deviations of it, with weights, where codes follow it by steps, of photosites of one kind.
-    fn offsets(&self, adc: &AdcRecord, gained: &[Kinds; 3]) -> Predicted<Vec<(f64, f64)>> {
+    fn offsets(&self, gained: &[Kinds]) -> Predicted<Vec<(f64, f64)>> {
         if self.offset_e == 0.0 {
             return Ok(vec![(0.0, 1.0)]);
         }
         let mut steps = Vec::new();
         for (k, kinds) in gained.iter().enumerate() {
-            if gained[..k].contains(kinds) {
+            let Class { blur_e, adc: Some(adc), .. } = &self.classes[k] else { continue };
+            if (0..k).any(|other| gained[other] == *kinds && self.classes[other].adc == Some(*adc)) {
                 continue;
             }
             for charge_e in charges(kinds.most(), adc)? {
-                let at = |edge_e: f64| Step {
-                    at: (edge_e - charge_e) / self.offset_e,
-                    width: self.blur_e[k] / self.offset_e,
-                };
-                steps.extend(edges(adc, charge_e, REACH * self.offset_e + 9.0 * self.blur_e[k])?.into_iter().map(at));
+                let at = |edge_e: f64| Step { at: (edge_e - charge_e) / self.offset_e, width: blur_e / self.offset_e };
+                steps.extend(edges(adc, charge_e, REACH * self.offset_e + 9.0 * blur_e)?.into_iter().map(at));
                 too_many(steps.len())?;
             }
         }

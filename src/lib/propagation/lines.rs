@@ -78,6 +78,10 @@ pub(super) const DRIFTING: &str = "its black level drifts along rows (`black_dri
 /// Why the paper says nothing.
 const NOT_IN_THE_PAPER: &str = "the paper has no equations for noise of rows and columns, nor for fixed offsets";
 
+/// The same where several amplifiers have read it.
+pub(super) const TAPPED_DRIFT: &str = "its black level drifts along rows (`black_drift_e`), and several amplifiers (`taps` of the sensor) \
+                                       have read them; photosites behind one are predicted";
+
 /// Along rows or along columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Axis {
@@ -198,23 +202,37 @@ impl Photosite {
         if !self.has_lines() {
             return Ok([LineCovariance::default(); 3]);
         }
+        let Some(slopes) = self.line_slopes(expected_e)? else {
+            let [row, column] = Axis::ALL.map(|axis| self.curved(&[axis], expected_e));
+            return Ok(self.by_class(&row?, &column?, [self.slope(); 3]));
+        };
+        let [row, column] = Axis::ALL.map(|axis| self.straight(axis, expected_e, slopes));
+        Ok(self.by_class(&row, &column, slopes[0]))
+    }
+
+    /// Slopes of the samples of each class to what is added to their lines, and to what these have more of the light; none where they follow
+    /// it on a curve.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::lines`].
+    pub(super) fn line_slopes(&self, expected_e: [f64; 3]) -> Predicted<Option<[[f64; 3]; 2]>> {
         let regime = self.regime(expected_e)?;
         if self.has_tails() && regime != Regime::Curved {
-            return self.lines_of_unlike(expected_e);
+            return self.slopes_of_unlike(expected_e).map(Some);
         }
-        let mut slopes = [self.slope(); 3];
-        let [row, column] = match regime {
-            Regime::Straight => Axis::ALL.map(|axis| self.straight(axis, expected_e, [self.slope(); 3])),
-            Regime::OnAverage => {
-                slopes = expected_e.map(|expected_e| self.mean_slope(expected_e));
-                Axis::ALL.map(|axis| self.straight(axis, expected_e, slopes))
-            }
-            Regime::Curved => {
-                let of_axis = |axis: Axis| self.curved(&[axis], expected_e);
-                [of_axis(Axis::Row)?, of_axis(Axis::Column)?]
-            }
-        };
-        Ok(self.by_class(&row, &column, slopes))
+        Ok(match regime {
+            Regime::Straight => Some([[self.slope(); 3]; 2]),
+            Regime::OnAverage => Some([expected_e.map(|expected_e| self.mean_slope(expected_e)); 2]),
+            Regime::Curved => None,
+        })
+    }
+
+    /// The same photosites over exposures: their means, in which all that rows and columns have anew is noise like that of their own.
+    #[must_use]
+    pub(super) fn over_exposures(&self) -> Self {
+        let darks = self.darks.map(|dark| dark.map(|dark| Dark { model: anew_apart(&dark.model), ..dark }));
+        Self { model: anew_apart(&self.model), darks, ..*self }
     }
 
     /// What of that is the same in every exposure: what the means share that photosites have over exposures, in which all that rows and
@@ -224,8 +242,7 @@ impl Photosite {
     ///
     /// As [`Self::lines`].
     pub(super) fn fixed_lines(&self, expected_e: [f64; 3]) -> Predicted<[LineCovariance; 3]> {
-        let darks = self.darks.map(|dark| dark.map(|dark| Dark { model: anew_apart(&dark.model), ..dark }));
-        Self { model: anew_apart(&self.model), darks, ..*self }.lines(expected_e)
+        self.over_exposures().lines(expected_e)
     }
 
     /// Whether photosites of these signals follow what they share on a curve.
@@ -263,9 +280,9 @@ impl Photosite {
         self.models().any(|model| model.lines.black_drift_e > 0.0)
     }
 
-    /// The same of photosites that are unlike each other, to first order in what is shared: of hot ones that are full the gain of
-    /// a row is nothing, and of readings beyond the codes its noise.
-    fn lines_of_unlike(&self, expected_e: [f64; 3]) -> Predicted<[LineCovariance; 3]> {
+    /// Those of photosites that are unlike each other, to first order in what is shared: of hot ones that are full the gain of a row is
+    /// nothing, and of readings beyond the codes its noise.
+    fn slopes_of_unlike(&self, expected_e: [f64; 3]) -> Predicted<[[f64; 3]; 2]> {
         let slope = self.slope();
         let of_offsets =
             expected_e.map(|expected_e| slope * self.mean_of(expected_e, |site| site.share_read(expected_e)));
@@ -274,15 +291,7 @@ impl Photosite {
         if of_offsets.iter().chain(&of_gains).any(|share| share.is_nan()) {
             return Err(Unpredictable::Beyond(TOO_LONG));
         }
-        let x = self.line_signals(expected_e);
-        let of_axis = |axis: Axis| {
-            let terms = self.terms(axis);
-            Matrix3::from_fn(|k, l| {
-                of_offsets[k] * of_offsets[l] * terms.constant + of_gains[k] * of_gains[l] * terms.square * x[k] * x[l]
-            })
-        };
-        let [row, column] = Axis::ALL.map(of_axis);
-        Ok(self.by_class(&row, &column, of_offsets))
+        Ok([of_offsets, of_gains])
     }
 
     /// The share of readings that are within the codes.
@@ -354,11 +363,12 @@ impl Photosite {
         charge.mean + DEVIATIONS * charge.variance.max(0.0).sqrt() + SKEWED_E >= self.model.full_well_e
     }
 
-    /// R of the straight codes, of such slopes to the charge.
-    fn straight(&self, axis: Axis, expected_e: [f64; 3], slopes: [f64; 3]) -> Matrix3<f64> {
+    /// R of the straight codes, of such slopes.
+    fn straight(&self, axis: Axis, expected_e: [f64; 3], [of_offsets, of_gains]: [[f64; 3]; 2]) -> Matrix3<f64> {
         let terms = self.terms(axis);
         let x = self.line_signals(expected_e);
-        Matrix3::from_fn(|k, l| slopes[k] * slopes[l] * terms.at(x[k], x[l]))
+        let at = |k: usize| (x[k], [of_offsets[k], of_gains[k]]);
+        Matrix3::from_fn(|k, l| terms.between(at(k), at(l)))
     }
 
     /// What [`LineTerms`] are of: the signals, or with a flat field y/F, by which what is in the flat field counts.
@@ -367,7 +377,8 @@ impl Photosite {
         [0, 1, 2].map(|k| expected_e[k] / flat.expected_e[k])
     }
 
-    fn terms(&self, axis: Axis) -> LineTerms {
+    /// What two photosites share by rows, or by columns, before any slope.
+    pub(super) fn terms(&self, axis: Axis) -> LineTerms {
         let parts = |model: &NoiseModel| axis.parts(&model.lines);
         let averages = |darks: &'_ [Option<Dark>]| -> Vec<Dark> { darks.iter().flatten().copied().collect() };
         let darks = averages(&self.darks);
@@ -407,6 +418,9 @@ fn kept_of_one(average: Option<&AverageRecord>) -> f64 {
     average.map_or(1.0, |record| 1.0 / f64::from(record.frames.max(1)))
 }
 
+/// The signal of a photosite, and its slopes to what is added to its lines and to what these have more of the light.
+pub(super) type Site = (f64, [f64; 2]);
+
 /// What two photosites of signals x and y in one row, or column, share, in e²: a + b (x + y) + c x y.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LineTerms {
@@ -418,6 +432,12 @@ pub(super) struct LineTerms {
 impl LineTerms {
     pub fn at(&self, x: f64, y: f64) -> f64 {
         self.constant + self.linear * (x + y) + self.square * x * y
+    }
+
+    /// The same of samples, of such signals and slopes to what is added to their lines and to what these have more of the light.
+    pub fn between(&self, (x, [of_offsets, of_gains]): Site, (y, [with_offsets, with_gains]): Site) -> f64 {
+        of_offsets * with_offsets * (self.constant + self.linear * (x + y))
+            + of_gains * with_gains * self.square * x * y
     }
 
     /// Less what does not hang on signals.

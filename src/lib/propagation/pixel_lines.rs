@@ -29,18 +29,20 @@ pub(super) struct AtLevel {
 }
 
 impl PixelLines {
-    /// Of the photosites of a frame, an average or not, of which such places are the kinds of pixels.
+    /// Of the photosites of a frame, an average or not, of which such places are the kinds of pixels; `gain` is the slope of the photosite at
+    /// a place of the frame, relative to that of all.
     pub fn of(
         photosite: Photosite,
         average: Option<&AverageRecord>,
         table: &WeightTable,
         kinds: &[[usize; 2]],
         geometry: &Geometry,
+        gain: impl Fn([isize; 2]) -> f64,
     ) -> Self {
         let drift = photosite.drifts().then(|| PixelDrift::of(&photosite, average, table, kinds, geometry));
         let [rows, columns] = photosite.line_terms(average);
         Self {
-            gains: kinds.iter().map(|&at| PixelGains::of_lines(table, at, geometry)).collect(),
+            gains: kinds.iter().map(|&at| PixelGains::of_lines(table, at, geometry, &gain)).collect(),
             terms: [drift.as_ref().map_or(rows, |drift| drift.off(rows)), columns],
             drift,
             photosite,
@@ -62,7 +64,7 @@ impl PixelLines {
         AtLevel { shared, slopes }
     }
 
-    /// What photosites of such levels share with others, of their variance.
+    /// What photosites of such levels share with others, of their variance, where their slope is that of all.
     pub fn of_sites(&self, AtLevel { shared, slopes }: &AtLevel) -> [f64; 3] {
         std::array::from_fn(|class| {
             let own = PAIRS.iter().position(|pair| *pair == [class, class]).unwrap_or_default();
@@ -86,13 +88,17 @@ impl PixelLines {
 
 impl PixelGains<{ 2 * PAIRS.len() }> {
     /// Those of what pairs of classes share in rows, then in columns.
-    fn of_lines(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
+    fn of_lines(table: &WeightTable, at: [usize; 2], geometry: &Geometry, gain: impl Fn([isize; 2]) -> f64) -> Self {
         let phase = phase_at(at, geometry);
         let class = |offset| table.class(phase, offset) as usize;
+        let gained = |(offset, weight): ([isize; 2], f64)| {
+            let place = [0, 1].map(|axis| at[axis].cast_signed() + offset[axis]);
+            (offset, weight * gain(place))
+        };
         Self::by(table, at, geometry, |a, b| {
             let mut sums = [0.0; 2 * PAIRS.len()];
-            for (here, weight) in a.sites() {
-                for (there, other) in b.sites() {
+            for (here, weight) in a.sites().map(gained) {
+                for (there, other) in b.sites().map(gained) {
                     let [k, l] = [class(here), class(there)];
                     let pair = PAIRS.iter().position(|pair| *pair == [k.min(l), k.max(l)]).unwrap_or_default();
                     sums[pair] += if here[1] == there[1] { weight * other } else { 0.0 };

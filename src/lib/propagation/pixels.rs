@@ -8,7 +8,7 @@ use super::charge;
 use super::covariance::Covariance;
 use super::ground::{corrected, quantity_of_sites};
 use super::level_variance::LevelVariance;
-use super::lines::DRIFTING;
+use super::lines::{DRIFTING, TAPPED_DRIFT};
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::pixel_gains::{PixelGains, phase_at};
@@ -16,7 +16,7 @@ use super::pixel_light::PixelVariances;
 use super::pixel_lines::PixelLines;
 use super::repeated::average_of;
 use super::smooth_hue;
-use super::tapped::Axis;
+use super::tapped_axis::Axis;
 use super::taps;
 use crate::camera::taps::Taps;
 use crate::cfa::Class;
@@ -102,9 +102,20 @@ struct PixelTaps {
     variances: Vec<[LevelVariance; 3]>,
     /// What no light reads behind each, less what it does without them.
     shifts: Vec<f64>,
+    /// The slope of each, relative to that of the sensor.
+    slopes: Vec<f64>,
 }
 
 impl PixelTaps {
+    /// The variances of what is the own of photosites, of which those of the sensor's slope share so much.
+    fn own(&self, level: [f64; 3], shared: [f64; 3]) -> [f64; 3 * TAPS] {
+        let whole = self.at(level);
+        std::array::from_fn(|index| {
+            let slope = self.slopes.get(index / 3).copied().unwrap_or_default();
+            (whole[index] - slope * slope * shared[index % 3]).max(0.0)
+        })
+    }
+
     /// The variances of the classes behind each amplifier, as all photosites read such levels above black.
     fn at(&self, level: [f64; 3]) -> [f64; 3 * TAPS] {
         std::array::from_fn(|index| {
@@ -174,8 +185,11 @@ impl PixelNoise {
             None => None,
         };
         let kinds: Vec<[usize; 2]> = places().collect();
-        let of_lines =
-            photosite.has_lines().then(|| PixelLines::of(photosite, average.as_ref(), table, &kinds, &frame.geometry));
+        let slopes = relative_slopes(frame);
+        let gain = |place: [isize; 2]| slopes.as_ref().map_or(1.0, |slopes| slopes(place));
+        let of_lines = photosite
+            .has_lines()
+            .then(|| PixelLines::of(photosite, average.as_ref(), table, &kinds, &frame.geometry, gain));
         let of_black = metadata
             .black_noise
             .map(|noise| (gains(PixelGains::of_black), [noise.row_adu2, noise.column_adu2, noise.site_adu2]));
@@ -203,15 +217,13 @@ impl PixelNoise {
         let level = rgb.map(|sample| (sample - self.black) * share);
         let all = |mut variances: [f64; 3], hues: Option<[f64; 3]>| {
             let lines = self.of_lines.as_ref().map(|lines| (lines, lines.at(level)));
-            if let Some((lines, level)) = &lines {
-                let shared = lines.of_sites(level);
-                variances
-                    .iter_mut()
-                    .zip(shared)
-                    .for_each(|(variance, shared)| *variance = (*variance - shared).max(0.0));
+            let shared = lines.as_ref().map(|(lines, level)| lines.of_sites(level));
+            if let Some(shared) = shared {
+                let off = |(variance, shared): (&mut f64, f64)| *variance = (*variance - shared).max(0.0);
+                variances.iter_mut().zip(shared).for_each(off);
             }
             let mut covariance = match &self.of_taps {
-                Some(taps) => taps.gains[kind].covariance(taps.at(level), hues),
+                Some(taps) => taps.gains[kind].covariance(taps.own(level, shared.unwrap_or_default()), hues),
                 None => self.gains[kind].covariance(variances, hues),
             };
             if let Some((lines, level)) = &lines {
@@ -259,6 +271,21 @@ fn places(frame: &FrameHeader, reach: usize) -> [Places; 2] {
     })
 }
 
+/// Why nothing is said of what rows and columns share behind amplifiers of a bent converter.
+const BENT_TAPS: &str = "its rows or columns share noise, several amplifiers (`taps` of the sensor) read them, and the curve of the converter \
+                         (`linearization`) bends what each makes of it";
+
+/// The gain of what reads a place of a frame, of codes of a sensor that is read through several amplifiers.
+fn relative_slopes(frame: &FrameHeader) -> Option<impl Fn([isize; 2]) -> f64 + '_> {
+    let (readout, taps) = (frame.readout().ok()?, frame.taps()?);
+    let are_codes = quantity_of_sites(frame) == QuantityKind::Adu;
+    let origin = frame.geometry.origin.map(i64::from);
+    Some(move |place: [isize; 2]| match are_codes {
+        true => taps.gain(readout.tap([0, 1].map(|axis| origin[axis] + place[axis] as i64))),
+        false => 1.0,
+    })
+}
+
 /// What each amplifier makes of the photosites of pixels at such examples of all places.
 fn pixel_taps(
     frame: &FrameHeader,
@@ -267,8 +294,11 @@ fn pixel_taps(
     average: Option<&AverageRecord>,
     one: &Photosite,
 ) -> Result<PixelTaps> {
-    if one.has_lines() {
-        return Err(frame.refuse(taps::with_lines(frame)));
+    if one.drifts() {
+        return Err(frame.refuse(TAPPED_DRIFT));
+    }
+    if one.has_lines() && one.adc.is_some_and(|adc| adc.is_bent()) {
+        return Err(frame.refuse(BENT_TAPS));
     }
     if one.flat.is_some() {
         return Err(frame.refuse(taps::FLATTENED));
@@ -277,15 +307,16 @@ fn pixel_taps(
     let geometry = &frame.geometry;
     let tap = |place: [isize; 2]| readout.tap([0, 1].map(|axis| i64::from(geometry.origin[axis]) + place[axis] as i64));
     let gains = examples.into_iter().map(|at| PixelGains::of_taps(table, at, geometry, tap)).collect();
-    let (mut variances, mut shifts) = (Vec::new(), Vec::new());
+    let (mut variances, mut shifts, mut slopes) = (Vec::new(), Vec::new(), Vec::new());
     for tap in 0..frame.taps().map_or(0, Taps::count) {
         let (photosite, _) = photosite_of(&taps::of_tap(frame, tap))?;
         photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
         let largest = photosite.model.full_well_e * photosite.slope();
+        slopes.push(photosite.slope() / one.slope());
         shifts.push(photosite.moments(0.0).moments.mean - one.moments(0.0).moments.mean);
         variances.push(LevelVariance::of_classes(&photosite, average, largest));
     }
-    Ok(PixelTaps { gains, variances, shifts })
+    Ok(PixelTaps { gains, variances, shifts, slopes })
 }
 
 /// The photosites that a demosaicked frame was made of, and what no light reads in it, in the unit of its samples.

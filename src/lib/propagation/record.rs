@@ -18,7 +18,7 @@ pub fn note(frame: &mut FrameHeader, equations: Equations) {
         let stds = |covariance: &Matrix3<f64>| [0, 1, 2].map(|i| covariance[(i, i)].max(0.0).sqrt());
         let (mean, std) = match prediction {
             FramePrediction::Planes(classes) => of(classes),
-            FramePrediction::Groups(groups) => of(pooled(&groups)),
+            FramePrediction::Groups(sites) => of(pooled(&sites.groups)),
             FramePrediction::Pixels(pixels) => (pixels.mean, stds(&pixels.covariance)),
             FramePrediction::Tapped(pixels) => (pixels.mean, stds(&pixels.covariance)),
         };

@@ -125,6 +125,12 @@ fn is_mean(record: &AverageRecord) -> bool {
 }
 
 impl Photosite {
+    /// One exposure, of which nothing came off.
+    #[must_use]
+    pub(super) fn one_exposure(&self) -> Self {
+        Self { darks: [None; MOST_DARKS], flat: None, ..*self }
+    }
+
     /// Makes sure that a formula is known for an average of exposures.
     ///
     /// # Errors
@@ -147,7 +153,7 @@ impl Photosite {
         if let Some((_, found)) = self.flat.and_then(|_| self.divided_over(class, expected_e)) {
             return found;
         }
-        let one = Self { darks: [None; MOST_DARKS], flat: None, ..*self };
+        let one = self.one_exposure();
         let rounding = one.adc.map_or(0.0, |adc| adc.rounding_at(one.model.dark_e + expected_e));
         let unlike = (is_told && !one.has_tails()).then(|| one.unlike(expected_e));
         let whole = one.moments(expected_e);
@@ -223,7 +229,7 @@ impl Photosite {
     ///
     /// [`Unpredictable::Beyond`] where no formula tells what rows and columns share.
     pub(super) fn temporal_of(&self, expected_e: [f64; 3]) -> Predicted<[Temporal; 3]> {
-        let one = Self { darks: [None; MOST_DARKS], flat: None, ..*self };
+        let one = self.one_exposure();
         let lines = match one.has_lines() {
             true => {
                 let [whole, fixed] = [one.lines(expected_e)?, one.fixed_lines(expected_e)?];

@@ -41,7 +41,7 @@ pub fn is_possible(frame: &FrameHeader, levels: &FullLevels) -> bool {
     let of_class = |class: Prediction| (class.moments.mean, class.moments.std());
     let moments: Vec<[(f64, f64); 3]> = match of_frame(&bounding, Equations::Exact) {
         Ok(FramePrediction::Planes(classes)) => vec![classes.map(of_class)],
-        Ok(FramePrediction::Groups(groups)) => groups.iter().map(|group| group.sites.map(of_class)).collect(),
+        Ok(FramePrediction::Groups(sites)) => sites.groups.iter().map(|group| group.sites.map(of_class)).collect(),
         Ok(FramePrediction::Pixels(pixels)) => {
             vec![[0, 1, 2].map(|k| (pixels.mean[k], pixels.covariance[(k, k)].max(0.0).sqrt()))]
         }

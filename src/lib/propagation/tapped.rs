@@ -10,9 +10,13 @@ use super::gains;
 use super::moments::Prediction;
 use super::sampling::Sampling;
 use super::spaces::{Channels, Curved};
+use super::tap_lines::TapLines;
+use super::tapped_axis::Axis;
+pub use super::tapped_factors::OverExposures;
+use super::tapped_factors::{Factors, Loads, Site, first_order, loads, product};
 use super::taps::Group;
 use super::unpredictable::{Predicted, Unpredictable};
-use crate::camera::taps::Taps;
+use crate::camera::taps::{TapLayout, Taps};
 use crate::metadata::FrameHeader;
 use crate::names::Named;
 use crate::numerics::normal::{self, MeanVariance};
@@ -21,7 +25,6 @@ use crate::stages::demosaic::stencil::{self, PHASES, REACH, phase};
 use crate::stages::demosaic::weights::{WeightTable, Weights};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::OnceLock;
 
 /// Why nothing is said of a frame that lies elsewhere than its record says.
@@ -56,23 +59,12 @@ pub(super) struct Array {
     size: [u32; 2],
     /// By amplifier.
     sites: Vec<[Prediction; 3]>,
+    /// What of their variance is their own.
+    own: Vec<[f64; 3]>,
+    /// What they share by rows and by columns; none where they share nothing.
+    pub factors: Option<[Factors; 2]>,
     /// Columns and rows.
     pub axes: [Axis; 2],
-}
-
-/// The lines of a plane along one axis.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Axis {
-    /// The place on the sensor of the plane's first.
-    first: i64,
-    /// What reads each line of the plane, and its parity.
-    codes: Vec<u8>,
-    /// Those of the rectangle.
-    pub lines: Range<usize>,
-    /// The kinds of these.
-    pub kinds: Vec<usize>,
-    /// One of each kind, and how many there are.
-    pub examples: Vec<(usize, f64)>,
 }
 
 /// Pixels of one kind.
@@ -89,85 +81,17 @@ pub(super) struct Kind {
     /// Weights of the three channels by offset.
     table: Vec<[f64; 3]>,
     from_camera: Matrix3<f64>,
+    /// What it has of what rows and columns share; none where they share nothing.
+    pub loads: Option<[Loads; 2]>,
     /// Where the channels are curved, those that they are curved in: their mean, and the derivatives of the channels by them.
     curved_in: Option<([f64; 3], Matrix3<f64>)>,
 }
 
-/// A photosite of a pixel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Site {
-    pub offset: [isize; 2],
-    pub class: usize,
-    pub tap: usize,
-    pub variance: f64,
-    /// What it gives to the channels, to first order.
-    pub weights: [f64; 3],
-}
-
 const SIDE: usize = 2 * REACH.unsigned_abs() + 1;
 
-/// A code of no line.
-const OUTSIDE: u8 = u8::MAX;
-
-/// What a line of the rectangle has more than one beside it.
-const WITHIN: u8 = 64;
-
-impl Axis {
-    /// Of a plane of so many lines from `first` on, of which `lines` are the rectangle's; `taps` reads a line.
-    pub fn of(first: i64, length: usize, lines: Range<usize>, reach: usize, taps: impl Fn(i64) -> [usize; 2]) -> Self {
-        let code = |line: i64| {
-            let [a, b] = taps(line).map(|tap| u8::try_from(tap).unwrap_or_default());
-            2 * (4 * a + b) + u8::from(line.rem_euclid(2) == 1)
-        };
-        let codes = (0..length).map(|place| code(first + place as i64)).collect();
-        let mut axis = Self { first, codes, lines, kinds: Vec::new(), examples: Vec::new() };
-        (axis.kinds, axis.examples) = axis.alike(axis.lines.clone(), reach, false);
-        axis
-    }
-
-    /// The kinds of lines by what is around them, so far to either side, and one of each kind with their number; with `tells_rim` lines
-    /// of the rectangle are told from those beside it.
-    fn alike(&self, lines: Range<usize>, far: usize, tells_rim: bool) -> (Vec<usize>, Vec<(usize, f64)>) {
-        let code = |place: Option<usize>| {
-            let found = place.and_then(|place| Some((place, *self.codes.get(place)?)));
-            found.map_or(OUTSIDE, |(place, code)| {
-                code + if tells_rim && self.lines.contains(&place) { WITHIN } else { 0 }
-            })
-        };
-        let far = far.cast_signed();
-        let mut known: BTreeMap<Vec<u8>, usize> = BTreeMap::new();
-        let mut examples: Vec<(usize, f64)> = Vec::new();
-        let kinds = lines.map(|line| {
-            let key = (-far..=far).map(|offset| code(line.checked_add_signed(offset))).collect();
-            let kind = *known.entry(key).or_insert_with(|| {
-                examples.push((line, 0.0));
-                examples.len() - 1
-            });
-            examples[kind].1 += 1.0;
-            kind
-        });
-        (kinds.collect(), examples)
-    }
-
-    /// Lines of the rectangle, one of each kind that differs in anything up to so far away, and how many there are.
-    pub fn examples(&self, far: usize) -> Vec<(usize, f64)> {
-        self.alike(self.lines.clone(), far, true).1
-    }
-
-    /// The same of the lines that have a part in the rectangle.
-    pub fn examples_around(&self, reach: usize, far: usize) -> Vec<(usize, f64)> {
-        let around = self.lines.start.saturating_sub(reach)..(self.lines.end + reach).min(self.codes.len());
-        self.alike(around, far, true).1
-    }
-
-    fn kind(&self, line: usize) -> usize {
-        self.kinds[line - self.lines.start]
-    }
-}
-
 impl Array {
-    /// Of the photosites of a frame, `groups` of them with their amplifiers.
-    fn of(frame: &FrameHeader, groups: &[(usize, Group)]) -> Predicted<Self> {
+    /// Of the photosites of a frame, `groups` of them with their amplifiers, and what these share.
+    fn of(frame: &FrameHeader, groups: &[(usize, Group)], lines: Option<&TapLines>) -> Predicted<Self> {
         let record = frame.metadata.demosaic.as_ref().ok_or(Unpredictable::Missing("demosaic"))?;
         let method = Method::named(&record.method)
             .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;
@@ -186,17 +110,25 @@ impl Array {
         let axes = axis(0).zip(axis(1)).ok_or(Unpredictable::Beyond(ELSEWHERE))?;
         let none = [Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0); 3];
         let mut sites = vec![none; taps.count()];
-        for (tap, group) in groups {
-            if let Some(sites) = sites.get_mut(*tap) {
-                *sites = group.sites;
+        let mut own = vec![[0.0; 3]; taps.count()];
+        for (index, (tap, group)) in groups.iter().enumerate() {
+            let of_class = |class: usize| {
+                let variance = group.sites[class].moments.variance;
+                lines.map_or(variance, |lines| lines.own(3 * index + class, variance))
+            };
+            if let (Some(sites), Some(own)) = (sites.get_mut(*tap), own.get_mut(*tap)) {
+                (*sites, *own) = (group.sites, [0, 1, 2].map(of_class));
             }
         }
+        let taps_of_groups: Vec<usize> = groups.iter().map(|(tap, _)| *tap).collect();
         Ok(Self {
             // No weight of the methods that are predicted hangs on hues.
             weights: WeightTable::of(method, record.cfa).about([1.0; 2]),
             taps,
             size: [readout.width, readout.height],
             sites,
+            own,
+            factors: lines.map(|lines| lines.axes().map(|line| Factors::of(line, &taps_of_groups))),
             axes: axes.into(),
         })
     }
@@ -216,6 +148,48 @@ impl Array {
         &self.sites[self.tap(at)][self.weights.pattern().class(x, y) as usize]
     }
 
+    /// Photosites of the rectangle, one of each kind of place, and how many there are.
+    fn examples(&self) -> impl Iterator<Item = ([usize; 2], f64)> + '_ {
+        let [columns, rows] = &self.axes;
+        rows.examples.iter().flat_map(|(y, of_y)| columns.examples.iter().map(move |(x, of_x)| ([*x, *y], of_x * of_y)))
+    }
+
+    /// What photosites of two classes share on average in a row (axis 0) or column (1) that has both: behind one amplifier, or along rows
+    /// whose columns go by turns, behind any.
+    fn mean_of_line(&self, factors: &Factors, axis: usize, classes: [usize; 2]) -> f64 {
+        let by_turns = axis == 0 && self.taps.layout == TapLayout::Columns;
+        // Of each line, how many photosites of both classes each amplifier has.
+        let mut lines: BTreeMap<usize, BTreeMap<usize, [f64; 2]>> = BTreeMap::new();
+        for (at, count) in self.examples() {
+            let [x, y] = self.on_sensor(at);
+            let class = self.weights.pattern().class(x, y) as usize;
+            let counts = lines.entry(at[1 - axis]).or_default().entry(self.tap(at)).or_default();
+            (0..2).filter(|i| classes[*i] == class).for_each(|i| counts[i] += count);
+        }
+        let (mut sum, mut all) = (0.0, 0.0);
+        let of = |a: usize, b: usize| factors.between([a, classes[0]], [b, classes[1]]);
+        for counts in lines.values() {
+            let whole = counts.values().fold([0.0; 2], |sum, counts| [sum[0] + counts[0], sum[1] + counts[1]]);
+            if whole.contains(&0.0) {
+                continue;
+            }
+            for (a, [one, _]) in counts {
+                sum += match by_turns {
+                    true => counts.iter().map(|(b, [_, other])| one * other / whole[1] * of(*a, *b)).sum(),
+                    false => one * of(*a, *a),
+                };
+            }
+            all += whole[0];
+        }
+        if all > 0.0 { sum / all } else { 0.0 }
+    }
+
+    /// What of the variance of that photosite is its own.
+    pub fn own(&self, at: [usize; 2]) -> f64 {
+        let [x, y] = self.on_sensor(at);
+        self.own[self.tap(at)][self.weights.pattern().class(x, y) as usize]
+    }
+
     /// The pixel of a column and row, of demosaicked channels.
     fn pixel(&self, at: [usize; 2], black: f64) -> ([f64; 3], Vec<Site>) {
         let [x, y] = self.on_sensor(at);
@@ -231,16 +205,12 @@ impl Array {
             let class = self.weights.class(phase, offset) as usize;
             // What lies beyond an edge is folded back.
             let tap = self.tap([0, 1].map(|axis| at[axis].saturating_add_signed(offset[axis])));
-            let moments = self.sites[tap][class].moments;
-            mean.iter_mut().zip(weights).for_each(|(mean, weight)| *mean += weight * (moments.mean - black));
-            sites.push(Site { offset, class, tap, variance: moments.variance, weights });
+            let of_site = self.sites[tap][class].moments.mean;
+            mean.iter_mut().zip(weights).for_each(|(mean, weight)| *mean += weight * (of_site - black));
+            sites.push(Site { offset, class, tap, variance: self.own[tap][class], weights });
         }
         (mean, sites)
     }
-}
-
-fn product(a: &[f64; 3], b: &[f64; 3]) -> Matrix3<f64> {
-    Vector3::from(*a) * Vector3::from(*b).transpose()
 }
 
 impl Kind {
@@ -249,10 +219,9 @@ impl Kind {
         let through = |matrix: &Matrix3<f64>, values: [f64; 3]| -> [f64; 3] { (matrix * Vector3::from(values)).into() };
         sites.iter_mut().for_each(|site| site.weights = through(&channels.matrix, site.weights));
         let mut mean = through(&channels.matrix, mean.map(|mean| mean - channels.black));
-        let first_order = |sites: &[Site]| -> Matrix3<f64> {
-            sites.iter().map(|site| site.variance * product(&site.weights, &site.weights)).sum()
-        };
-        let mut covariance = first_order(&sites);
+        let own = |site: &Site| site.variance;
+        let factors = array.factors.as_ref();
+        let mut covariance = first_order(&sites, own, factors);
         let (mut bias, mut beyond, mut from_camera) = ([0.0; 3], Matrix3::zeros(), channels.matrix);
         let mut curved_in = None;
         if let Some(space) = channels.space {
@@ -262,33 +231,35 @@ impl Kind {
             let local = space.about(mean)?;
             curved_in = Some((mean, local.jacobian));
             let law = PixelLaw::of(sites.iter().map(|site| (site.weights, &array.sites[site.tap][site.class])));
+            // What rows and columns share is in the covariance alone: it is normal.
+            let law = PixelLaw { covariance, ..law };
             let found = curved::moments(mean, &[law], |xyz| space.value(xyz));
             (mean, covariance) = found.ok_or(Unpredictable::Beyond(curved::FAR_FROM_NORMAL))?;
             bias = [0, 1, 2].map(|i| mean[i] - local.value[i]);
             from_camera = local.jacobian * channels.matrix;
             sites.iter_mut().for_each(|site| site.weights = through(&local.jacobian, site.weights));
-            beyond = covariance - first_order(&sites);
+            beyond = covariance - first_order(&sites, own, factors);
         }
+        let loads = factors.map(|factors| [0, 1].map(|axis| loads(&sites, &factors[axis], axis)));
         let mut table = vec![[0.0; 3]; SIDE * SIDE];
         for site in &sites {
             table[index(site.offset)] = site.weights;
         }
-        Ok(Self { share, mean, bias, covariance, beyond, sites, table, from_camera, curved_in })
+        Ok(Self { share, mean, bias, covariance, beyond, sites, table, from_camera, loads, curved_in })
     }
 
-    /// What is the same in every exposure of what is curved beyond the weights, `fixed` the law of the means that photosites of an
-    /// amplifier and class have over exposures.
-    fn curved_pattern(&self, fixed: impl Fn(usize, usize) -> Prediction, space: Curved) -> Matrix3<f64> {
+    /// What is the same in every exposure of what is curved beyond the weights, `fixed` the law of the means that photosites have over
+    /// exposures, and `whole` what they share in one.
+    fn curved_pattern(&self, fixed: &OverExposures, whole: Option<&[Factors; 2]>, space: Curved) -> Matrix3<f64> {
         let found = self.curved_in.and_then(|(mean, jacobian)| Some((mean, jacobian, jacobian.try_inverse()?)));
         let Some((mean, jacobian, back)) = found else { return Matrix3::zeros() };
-        let before = |site: &Site| -> [f64; 3] { (back * Vector3::from(site.weights)).into() };
-        let of_sites: Vec<_> =
-            self.sites.iter().map(|site| (before(site), site.variance, fixed(site.tap, site.class))).collect();
-        let law = PixelLaw::of(of_sites.iter().map(|(weights, _, prediction)| (*weights, prediction)));
-        let whole: Matrix3<f64> =
-            of_sites.iter().map(|(weights, variance, _)| *variance * product(weights, weights)).sum();
-        let first_order = jacobian * law.covariance * jacobian.transpose();
-        curved::fixed(mean, &[(law, whole - law.covariance)], |channels| space.value(channels)) - first_order
+        let before = |site: &Site| Site { weights: (back * Vector3::from(site.weights)).into(), ..*site };
+        let sites: Vec<Site> = self.sites.iter().map(before).collect();
+        let law = PixelLaw::of(sites.iter().map(|site| (site.weights, &fixed.sites[site.tap][site.class])));
+        let law = PixelLaw { covariance: fixed.first_order(&sites), ..law };
+        let whole = first_order(&sites, |site| site.variance, whole);
+        let straight = jacobian * law.covariance * jacobian.transpose();
+        curved::fixed(mean, &[(law, whole - law.covariance)], |channels| space.value(channels)) - straight
     }
 
     /// What the photosite `offset` away gives to the channels.
@@ -317,14 +288,16 @@ fn index([x, y]: [isize; 2]) -> usize {
 }
 
 impl TappedPixels {
-    /// The pixels of a frame in such channels, after so much was subtracted from its photosites, of which each amplifier has a group.
+    /// The pixels of a frame in such channels, after so much was subtracted from its photosites, of which each amplifier has a group; `lines`
+    /// is what these share.
     pub(super) fn of(
         frame: &FrameHeader,
         channels: &Channels,
         black: f64,
         groups: &[(usize, Group)],
+        lines: Option<&TapLines>,
     ) -> Predicted<Self> {
-        let array = Array::of(frame, groups)?;
+        let array = Array::of(frame, groups, lines)?;
         let [columns, rows] = array.axes.each_ref().map(|axis| &axis.examples);
         let count = array.axes.iter().map(|axis| axis.lines.len() as f64).product::<f64>();
         let mut kinds = Vec::with_capacity(columns.len() * rows.len());
@@ -354,6 +327,22 @@ impl TappedPixels {
         &self.kinds[rows.kind(y) * columns.examples.len() + columns.kind(x)]
     }
 
+    /// Pixels of the rectangle.
+    pub(super) fn count(&self) -> f64 {
+        self.array.axes.iter().map(|axis| axis.lines.len() as f64).product()
+    }
+
+    /// Pixels of the rectangle up to so far away from a place, and how far they are.
+    pub(super) fn near(&self, at: [usize; 2], far: isize) -> impl Iterator<Item = (&Kind, [isize; 2])> {
+        let lines = |axis: usize| {
+            let all = &self.array.axes[axis].lines;
+            all.start.max(at[axis].saturating_add_signed(-far))..all.end.min(at[axis].saturating_add_signed(far + 1))
+        };
+        let (columns, rows) = (lines(0), lines(1));
+        let lag = move |to: [usize; 2]| [0, 1].map(|axis| to[axis].cast_signed() - at[axis].cast_signed());
+        rows.flat_map(move |y| columns.clone().map(move |x| [x, y])).map(move |to| (self.kind(to), lag(to)))
+    }
+
     /// Means and standard deviations of pixels of each kind.
     pub fn each_kind(&self) -> impl Iterator<Item = [(f64, f64); 3]> + '_ {
         let of = |kind: &Kind, i: usize| (kind.mean[i], kind.covariance[(i, i)].max(0.0).sqrt());
@@ -369,11 +358,28 @@ impl TappedPixels {
         self.kinds.iter().map(of_kind).sum()
     }
 
-    /// What is the same in every exposure of what is curved beyond the weights, within kinds of places; `fixed` is the law of the means
-    /// that photosites of an amplifier and class have over exposures.
-    pub fn curved_pattern(&self, fixed: impl Fn(usize, usize) -> Prediction) -> Matrix3<f64> {
+    /// What is the same in every exposure of what is curved beyond the weights, within kinds of places.
+    pub fn curved_pattern(&self, fixed: &OverExposures) -> Matrix3<f64> {
         let Some(space) = self.space else { return Matrix3::zeros() };
-        self.kinds.iter().map(|kind| kind.share * kind.curved_pattern(&fixed, space)).sum()
+        let whole = self.array.factors.as_ref();
+        self.kinds.iter().map(|kind| kind.share * kind.curved_pattern(fixed, whole, space)).sum()
+    }
+
+    /// What is the same in every exposure to first order, within kinds of places.
+    pub fn fixed(&self, fixed: &OverExposures) -> Matrix3<f64> {
+        self.kinds.iter().map(|kind| kind.share * fixed.first_order(&kind.sites)).sum()
+    }
+
+    /// The covariance over all pixels to first order, within kinds of places.
+    pub fn first_order(&self) -> Matrix3<f64> {
+        let factors = self.array.factors.as_ref();
+        let of_kind = |kind: &Kind| kind.share * first_order(&kind.sites, |site| site.variance, factors);
+        self.kinds.iter().map(of_kind).sum()
+    }
+
+    /// Whether photosites of a row or of a column share noise.
+    pub fn has_lines(&self) -> bool {
+        self.array.factors.is_some()
     }
 
     /// Distance of a pixel from what the mean is without noise.
@@ -389,21 +395,27 @@ impl TappedPixels {
     }
 
     /// To first order, the covariance of the mean of a patch well within the frame, over all its places or those of a phase: what is
-    /// within kinds of places.
+    /// within kinds of places. Amplifiers of halves read all of it or nothing; of those that read columns by turns each has as many.
     pub fn patch_mean(&self, phase: Option<usize>, size: [usize; 2]) -> Matrix3<f64> {
         let [mut sums, mut counts] = [[0.0; PHASES.len()]; 2];
-        let [columns, rows] = &self.array.axes;
-        for (y, of_y) in &rows.examples {
-            for (x, of_x) in &columns.examples {
-                let [column, row] = self.array.on_sensor([*x, *y]);
-                let place = stencil::phase(column, row);
-                sums[place] += of_x * of_y * self.array.site([*x, *y]).moments.variance;
-                counts[place] += of_x * of_y;
-            }
+        for (at, count) in self.array.examples() {
+            let [column, row] = self.array.on_sensor(at);
+            let place = stencil::phase(column, row);
+            sums[place] += count * self.array.own(at);
+            counts[place] += count;
         }
         let variances =
             std::array::from_fn(|place| if counts[place] > 0.0 { sums[place] / counts[place] } else { 0.0 });
-        let of = |phase| gains::patch_mean_by_place(&self.array.weights, phase, size, variances);
+        let shared = self.array.factors.as_ref().map(|factors| {
+            [0, 1].map(|axis| Matrix3::from_fn(|k, l| self.array.mean_of_line(&factors[axis], axis, [k, l])))
+        });
+        let of = |phase| {
+            let own = gains::patch_mean_by_place(&self.array.weights, phase, size, variances);
+            let shared = shared
+                .as_ref()
+                .map(|[rows, columns]| gains::patch_mean(&self.array.weights, phase, size).of_lines([rows, columns]));
+            own + shared.unwrap_or_default()
+        };
         let covariance = match phase {
             Some(phase) => of(phase),
             None => (0..PHASES.len()).map(of).sum::<Matrix3<f64>>() / PHASES.len() as f64,
@@ -412,10 +424,15 @@ impl TappedPixels {
     }
 
     /// The covariance over all pixels, to first order and within kinds of places, for photosites of such variances, by amplifier
-    /// and class.
-    pub fn within(&self, variance: impl Fn(usize, usize) -> f64) -> Matrix3<f64> {
-        let of_site = |site: &Site| variance(site.tap, site.class) * product(&site.weights, &site.weights);
-        let of_kind = |kind: &Kind| kind.share * kind.sites.iter().map(of_site).sum::<Matrix3<f64>>();
+    /// and class, of what is each photosite's own, or is the same along rows (0) or columns (1).
+    pub fn within(&self, shared_by: Option<usize>, variance: impl Fn(usize, usize) -> f64) -> Matrix3<f64> {
+        let Some(axis) = shared_by else {
+            let own = |site: &Site| variance(site.tap, site.class);
+            return self.kinds.iter().map(|kind| kind.share * first_order(&kind.sites, own, None)).sum();
+        };
+        let single = Factors::single(self.array.own.len(), |tap, class| variance(tap, class).max(0.0).sqrt());
+        let factors = if axis == 0 { [single, Factors::none()] } else { [Factors::none(), single] };
+        let of_kind = |kind: &Kind| kind.share * first_order(&kind.sites, |_| 0.0, Some(&factors));
         self.kinds.iter().map(of_kind).sum()
     }
 }

@@ -4,16 +4,18 @@
 //! photosites are groups of known sizes, one for each amplifier, and not drawn among them.
 
 use super::moments::{Equations, LineCovariance, Prediction};
+use super::tap_lines::{Lit, TapLines};
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::taps::TapLayout;
 use crate::cfa::{CfaPattern, Class};
 use crate::frame::Geometry;
-use crate::metadata::FrameHeader;
+use crate::metadata::{AverageRecord, FrameHeader};
 use crate::names::Named;
 use crate::numerics::normal::MeanVariance;
 use crate::stages::demosaic::Method;
+use nalgebra::Matrix3;
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Why nothing is said of what several amplifiers have read, where it is not told apart.
 const MIXED: &str = "several amplifiers (`taps` of the sensor) have read it, and this is told of frames and crops behind one of them, \
@@ -27,19 +29,6 @@ const MIXED_BY_TURNS: &str = "several amplifiers (`taps` of the sensor) have rea
 pub(super) const FLATTENED: &str = "it was divided by a flat field of a sensor that is read through several amplifiers (`taps`), and how their \
                          gains come off is not predicted";
 
-/// Why nothing is said of what rows and columns share.
-const WITH_LINES: &str = "its rows or columns share noise, and several amplifiers (`taps` of the sensor) read them; regions and crops \
-                          behind one of these are predicted";
-
-/// The same where no two columns beside each other are behind one amplifier.
-const LINES_BY_TURNS: &str = "its rows or columns share noise, and several amplifiers (`taps` of the sensor) read its columns by turns, of which \
-                              nothing is predicted but single columns before demosaicking";
-
-/// Why nothing is said of what rows and columns share on the sensor of a frame.
-pub(super) fn with_lines(frame: &FrameHeader) -> &'static str {
-    if are_by_turns(frame) { LINES_BY_TURNS } else { WITH_LINES }
-}
-
 /// Whether amplifiers read the columns of a frame by turns.
 pub(super) fn are_by_turns(frame: &FrameHeader) -> bool {
     frame.taps().is_some_and(|taps| taps.layout == TapLayout::Columns)
@@ -52,6 +41,147 @@ pub struct Group {
     pub counts: [f64; 3],
     /// Their moments.
     pub sites: [Prediction; 3],
+}
+
+/// Photosites of a frame or a region that several amplifiers have read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TappedSites {
+    /// Those of each.
+    pub groups: Vec<Group>,
+    /// What they share with others of their rows and columns; none where they share nothing.
+    pub lines: Option<Box<TapLines>>,
+    /// Where they are.
+    pub cells: Cells,
+}
+
+/// Photosites by rows and columns that are alike.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cells {
+    /// How many rows there are of each kind.
+    pub rows: Vec<f64>,
+    /// How many columns there are of each kind.
+    pub columns: Vec<f64>,
+    /// One of each kind of both.
+    pub all: Vec<Cell>,
+    /// Whether amplifiers read columns by turns.
+    pub are_by_turns: bool,
+}
+
+/// Photosites of the rows of one kind and the columns of one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cell {
+    /// The kind of their rows.
+    pub row: usize,
+    /// The kind of their columns.
+    pub column: usize,
+    /// Which of the groups they are of.
+    pub group: usize,
+    /// Their class; none of three planes.
+    pub class: Option<Class>,
+}
+
+impl Cells {
+    /// How many photosites there are in a cell.
+    pub fn count(&self, cell: &Cell) -> f64 {
+        self.rows[cell.row] * self.columns[cell.column]
+    }
+
+    /// What two photosites of a class have in common in a row on average, `line` that of two by their groups, over so many of its
+    /// successive columns from any on.
+    fn in_rows(&self, class: Class, columns: f64, line: impl Fn(usize, usize) -> f64) -> f64 {
+        let is_of = |cell: &&Cell| cell.class.is_none_or(|of| of == class);
+        let (mut sum, mut all) = (0.0, 0.0);
+        for row in 0..self.rows.len() {
+            let mut counts: BTreeMap<usize, f64> = BTreeMap::new();
+            for cell in self.all.iter().filter(|cell| cell.row == row).filter(is_of) {
+                *counts.entry(cell.group).or_default() += self.count(cell);
+            }
+            let (n, groups) = (counts.values().sum::<f64>(), counts.len() as f64);
+            let same: f64 = counts.iter().map(|(g, count)| count * line(*g, *g)).sum();
+            all += n;
+            sum += if self.are_by_turns && counts.len() > 1 {
+                let pairs = counts.keys().flat_map(|g| counts.keys().map(move |h| (*g, *h)));
+                let cross: f64 = pairs.filter(|(g, h)| g != h).map(|(g, h)| line(g, h)).sum();
+                // Each of the groups has q or q + 1 of the columns, r of them the latter, all r as likely.
+                let (q, r) = ((columns / groups).floor(), columns.rem_euclid(groups));
+                let [one, two] = [r / groups, r * (r - 1.0) / (groups * (groups - 1.0))];
+                let even = q * q + 2.0 * q * r / groups;
+                ((even + one) * groups * same + (even + two) * n * cross) / (columns * columns)
+            } else {
+                same
+            };
+        }
+        if all > 0.0 { sum / all } else { 0.0 }
+    }
+}
+
+impl TappedSites {
+    fn share(&self, group: usize, class: usize) -> f64 {
+        let all: f64 = self.groups.iter().map(|group| group.counts[class]).sum();
+        if all > 0.0 { self.groups[group].counts[class] / all } else { 0.0 }
+    }
+
+    /// What two photosites of two classes share on average in a row and in a column: behind one amplifier, or of a plane whose columns go by
+    /// turns, behind any.
+    fn between_classes(&self, k: usize, l: usize) -> [f64; 2] {
+        let Some(lines) = &self.lines else { return [0.0; 2] };
+        let is_plane = self.cells.all.iter().any(|cell| cell.class.is_some());
+        let groups = 0..self.groups.len();
+        lines.axes().map(|line| {
+            let of = |g: usize, h: usize| line[(3 * g + k, 3 * h + l)];
+            if is_plane && self.cells.are_by_turns {
+                let of_group =
+                    |g: usize| groups.clone().map(|h| self.share(g, k) * self.share(h, l) * of(g, h)).sum::<f64>();
+                return groups.clone().map(of_group).sum();
+            }
+            groups.clone().map(|g| 0.5 * (self.share(g, k) + self.share(g, l)) * of(g, g)).sum()
+        })
+    }
+
+    /// Covariance of R, G and B over all photosites; off the diagonal that of two in one row and one column, or of three planes of one
+    /// place, with what the means of amplifiers have in common.
+    pub fn covariance(&self) -> Matrix3<f64> {
+        let classes = pooled(&self.groups);
+        let is_plane = self.cells.all.iter().any(|cell| cell.class.is_some());
+        let off = |group: &Group, i: usize| group.sites[i].moments.mean - classes[i].moments.mean;
+        Matrix3::from_fn(|i, j| {
+            if i == j {
+                return classes[i].moments.variance;
+            }
+            let shared: f64 = self.between_classes(i, j).iter().sum();
+            // Amplifiers move the classes together, but for those of a plane, which are other photosites.
+            let of_place = |(g, group): (usize, &Group)| {
+                let together = self.lines.as_ref().map_or(0.0, |lines| lines.together[g][(i, j)]);
+                self.share(g, i) * (off(group, i) * off(group, j) + together)
+            };
+            let at_a_place: f64 = if is_plane { 0.0 } else { self.groups.iter().enumerate().map(of_place).sum() };
+            shared + at_a_place
+        })
+    }
+
+    /// Covariance of the mean of so many columns and rows of photosites, on average over their places; of amplifiers of halves of the sensor
+    /// behind one.
+    pub fn patch_mean(&self, [columns, rows]: [usize; 2]) -> Matrix3<f64> {
+        let [columns, rows] = [columns as f64, rows as f64];
+        let over = |k: usize, of: &dyn Fn(usize) -> f64| -> f64 {
+            (0..self.groups.len()).map(|g| self.share(g, k) * of(g)).sum()
+        };
+        Matrix3::from_fn(|k, l| {
+            let Some(lines) = &self.lines else {
+                let variance = |g: usize| self.groups[g].sites[k].moments.variance;
+                return if k == l { over(k, &variance) / (columns * rows) } else { 0.0 };
+            };
+            if k != l {
+                let [row, column] = self.between_classes(k, l);
+                let together = over(k, &|g| lines.together[g][(k, l)]);
+                return row / rows + column / columns + together / (columns * rows);
+            }
+            let own = over(k, &|g| lines.own(3 * g + k, self.groups[g].sites[k].moments.variance));
+            let column = over(k, &|g| lines.column[(3 * g + k, 3 * g + k)]);
+            let row = self.cells.in_rows(Class::ALL[k], columns, |g, h| lines.row[(3 * g + k, 3 * h + k)]);
+            own / (columns * rows) + row / rows + column / columns
+        })
+    }
 }
 
 /// Photosites of one amplifier, before anything is predicted.
@@ -98,12 +228,10 @@ fn kinds(first: i64, length: usize, kind: impl Fn(i64) -> [usize; 3]) -> Vec<(i6
     found.into_values().collect()
 }
 
-/// The parts of a frame that each of its amplifiers reads; one where there is one.
-pub(super) fn parts(frame: &FrameHeader) -> Vec<Part> {
+/// The amplifiers that have read a frame, and which photosites each; none where the sensor has one.
+fn cells(frame: &FrameHeader) -> Option<(Vec<usize>, Cells)> {
     let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
-    let Some(readout) = readout.filter(|readout| readout.taps.is_some()) else {
-        return vec![Part { tap: 0, counts: [1.0; 3], frame: frame.clone() }];
-    };
+    let readout = readout.filter(|readout| readout.taps.is_some())?;
     let Geometry { width, height, origin, .. } = frame.geometry;
     let [x0, y0] = origin.map(i64::from);
     let lines = |axis: usize, first: i64, length: usize| {
@@ -114,17 +242,36 @@ pub(super) fn parts(frame: &FrameHeader) -> Vec<Part> {
     };
     let (columns, rows) = (lines(0, x0, width), lines(1, y0, height));
     let pattern: Option<CfaPattern> = frame.metadata.cfa.and_then(|array| array.bayer());
-    let mut found: BTreeMap<usize, [f64; 3]> = BTreeMap::new();
-    for (y, of_rows) in &rows {
-        for (x, of_columns) in &columns {
-            let counts = found.entry(readout.tap([*x, *y])).or_default();
-            for class in Class::ALL {
-                let is_here = pattern.is_none_or(|pattern| pattern.class(*x, *y) == class);
-                counts[class as usize] += if is_here { of_rows * of_columns } else { 0.0 };
-            }
-        }
-    }
-    found.into_iter().map(|(tap, counts)| Part { tap, counts, frame: of_tap(frame, tap) }).collect()
+    let both = || rows.iter().flat_map(|(y, _)| columns.iter().map(move |(x, _)| [*x, *y]));
+    let taps: BTreeSet<usize> = both().map(|at| readout.tap(at)).collect();
+    let taps: Vec<usize> = taps.into_iter().collect();
+    let cell = |(index, [x, y]): (usize, [i64; 2])| Cell {
+        row: index / columns.len(),
+        column: index % columns.len(),
+        group: taps.binary_search(&readout.tap([x, y])).unwrap_or_default(),
+        class: pattern.map(|pattern| pattern.class(x, y)),
+    };
+    let all = both().enumerate().map(cell).collect();
+    let counts = |lines: &[(i64, f64)]| lines.iter().map(|(_, count)| *count).collect();
+    let (rows, columns) = (counts(&rows), counts(&columns));
+    Some((taps, Cells { rows, columns, all, are_by_turns: are_by_turns(frame) }))
+}
+
+/// The parts of a frame that each of its amplifiers reads; one where there is one.
+pub(super) fn parts(frame: &FrameHeader) -> Vec<Part> {
+    let Some((taps, cells)) = cells(frame) else {
+        return vec![Part { tap: 0, counts: [1.0; 3], frame: frame.clone() }];
+    };
+    let count = |group: usize, class: Class| -> f64 {
+        let is_here = |cell: &&Cell| cell.group == group && cell.class.is_none_or(|of| of == class);
+        cells.all.iter().filter(is_here).map(|cell| cells.count(cell)).sum()
+    };
+    let part = |(group, tap): (usize, &usize)| Part {
+        tap: *tap,
+        counts: Class::ALL.map(|class| count(group, class)),
+        frame: of_tap(frame, *tap),
+    };
+    taps.iter().enumerate().map(part).collect()
 }
 
 /// The frame with what its pixels are made of, as far as the plane reaches that they were made of, or else the sensor.
@@ -171,36 +318,36 @@ pub(super) fn of_one(frame: &FrameHeader) -> Predicted<Cow<'_, FrameHeader>> {
     }
 }
 
-/// The groups of photosites of a frame, by `moments` of a frame that one amplifier reads; none where one reads all, or pixels are
-/// made of several photosites.
+/// The photosites of a frame that several amplifiers have read, by `sites` of a frame that one amplifier reads; none where one reads all,
+/// or pixels are made of several photosites.
 ///
 /// # Errors
 ///
-/// Those of `moments`, and [`Unpredictable::Beyond`] where photosites of several groups share noise.
-pub(super) fn groups(
+/// Those of `sites`, and [`Unpredictable::Beyond`] where no formula tells what photosites of several groups share.
+pub(super) fn sites(
     frame: &FrameHeader,
     equations: Equations,
-    moments: impl Fn(&FrameHeader, Equations) -> Predicted<[Prediction; 3]>,
-) -> Predicted<Option<Vec<Group>>> {
+    sites: impl Fn(&FrameHeader, Equations) -> Predicted<(Lit, [Prediction; 3], Option<AverageRecord>)>,
+) -> Predicted<Option<TappedSites>> {
     if frame.taps().is_none() || frame.metadata.demosaic.is_some() {
         return Ok(None);
     }
     if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
         return Err(Unpredictable::Beyond(FLATTENED));
     }
-    let (parts, refused) = (parts(frame), with_lines(frame));
-    if parts.len() < 2 {
-        return Ok(None);
-    }
-    let mut found = Vec::new();
+    let parts = parts(frame);
+    let Some((_, cells)) = cells(frame).filter(|_| parts.len() > 1) else { return Ok(None) };
+    let (mut groups, mut lit, mut average) = (Vec::new(), Vec::new(), None);
     for Part { counts, frame, .. } in parts {
-        let sites = moments(&frame, equations)?;
-        if sites.iter().any(|site| site.lines != LineCovariance::default()) {
-            return Err(Unpredictable::Beyond(refused));
-        }
-        found.push(Group { counts, sites });
+        let (photosite, sites, of_average) = sites(&frame, equations)?;
+        groups.push(Group { counts, sites });
+        lit.push(photosite);
+        average = of_average;
     }
-    Ok(Some(found))
+    let moments: Vec<[Prediction; 3]> = groups.iter().map(|group| group.sites).collect();
+    let is_shared = moments.iter().flatten().any(|site| site.lines != LineCovariance::default());
+    let lines = if is_shared { TapLines::of(&lit, &moments, average.as_ref())? } else { None };
+    Ok(Some(TappedSites { groups, lines: lines.map(Box::new), cells }))
 }
 
 /// Mean, variance and third cumulant of photosites of groups taken together, by classes; their excess kurtosis is what they have on

@@ -59,14 +59,14 @@ impl<'a> Assessment<'a> {
             (Some(FramePrediction::Planes(predictions)), None) if is_three => {
                 Predicted::of_planes(predictions, count, region, frame.geometry.origin)
             }
-            (Some(FramePrediction::Groups(groups)), Some(counts)) if count > 0 => {
+            (Some(FramePrediction::Groups(sites)), Some(counts)) if count > 0 => {
                 of_classes = Class::ALL.map(|class| match counts[class as usize] {
                     0 => Predicted::default(),
-                    _ => Predicted::of_class_in_groups(groups, class),
+                    _ => Predicted::of_class_in_groups(sites, class),
                 });
-                Predicted::of_plane_in_groups(groups)
+                Predicted::of_plane_in_groups(sites)
             }
-            (Some(FramePrediction::Groups(groups)), None) if is_three => Predicted::of_groups(groups),
+            (Some(FramePrediction::Groups(sites)), None) if is_three => Predicted::of_groups(sites),
             (Some(FramePrediction::Tapped(pixels)), None) if is_three => Predicted::of_tapped(pixels),
             (Some(FramePrediction::Pixels(mixture)), None) if is_three => {
                 Predicted::of_pixels(mixture, sampling(mixture))

@@ -1,5 +1,6 @@
 //! What is predicted of the samples of a region.
 
+use super::cells::{self, Seen};
 use super::check::{Expected, pair, rounding};
 use super::grids::{self, Array, Grid, PlaneScatter};
 use super::groups;
@@ -7,7 +8,7 @@ use super::region::Region;
 use crate::cfa::Class;
 use crate::numerics::normal::MeanVariance;
 use crate::propagation::sampling::Sampling;
-use crate::propagation::taps::{Group, pooled};
+use crate::propagation::taps::{Group, TappedSites, pooled};
 use crate::propagation::{LineCovariance, PixelMoments, Prediction, SiteCovariance, TappedPixels};
 use nalgebra::Matrix3;
 
@@ -66,20 +67,20 @@ impl Predicted {
     }
 
     /// Of three planes that several amplifiers have read.
-    pub fn of_groups(groups: &[Group]) -> Self {
-        let sampling = groups::sampling(&groups::of_planes(groups));
+    pub fn of_groups(sites: &TappedSites) -> Self {
+        let sampling = sampling_of(sites, Seen::Planes);
         let population = sampling.covariance * ((sampling.count - 1.0) / sampling.count) + sampling.mean_covariance;
-        Self::of_three(&population, Self::grouped(&pooled(groups), groups, sampling))
+        Self::of_three(&population, Self::grouped(&pooled(&sites.groups), &sites.groups, sampling))
     }
 
     /// Of a class of a plane that several amplifiers have read.
-    pub fn of_class_in_groups(groups: &[Group], class: Class) -> Self {
-        let parts = groups::of_class(groups, class as usize);
-        let prediction = pooled(groups)[class as usize];
+    pub fn of_class_in_groups(sites: &TappedSites, class: Class) -> Self {
+        let parts = groups::of_class(&sites.groups, class as usize);
+        let prediction = pooled(&sites.groups)[class as usize];
         if parts.is_empty() {
             return Self::of_one(&prediction, 0);
         }
-        let sampling = groups::sampling(&parts);
+        let sampling = sampling_of(sites, Seen::Class(class));
         let count = sampling.count;
         let one = Self::of_one_with(Expectation::of_sampling(&prediction, &sampling), &prediction, count > 0.0);
         let alone: Vec<Group> =
@@ -88,12 +89,12 @@ impl Predicted {
     }
 
     /// Of a plane behind a filter array that several amplifiers have read.
-    pub fn of_plane_in_groups(groups: &[Group]) -> Self {
-        let parts = groups::of_plane(groups);
+    pub fn of_plane_in_groups(sites: &TappedSites) -> Self {
+        let parts = groups::of_plane(&sites.groups);
         let alone: Vec<Group> =
             parts.iter().map(|(count, sites)| Group { counts: [*count; 3], sites: *sites }).collect();
         let prediction = pooled(&alone)[0];
-        let sampling = groups::sampling(&parts);
+        let sampling = sampling_of(sites, Seen::All);
         Self::of_one_with(Expectation::of_sampling(&prediction, &sampling), &prediction, sampling.count > 0.0)
     }
 
@@ -269,6 +270,16 @@ impl Expectation {
             std_error,
         }
     }
+}
+
+/// How samples scatter that several amplifiers have read.
+fn sampling_of(sites: &TappedSites, seen: Seen) -> Sampling {
+    let parts = || match seen {
+        Seen::Planes => groups::of_planes(&sites.groups),
+        Seen::Class(class) => groups::of_class(&sites.groups, class as usize),
+        Seen::All => groups::of_plane(&sites.groups),
+    };
+    sites.lines.as_ref().map_or_else(|| groups::sampling(&parts()), |lines| cells::sampling(sites, lines, seen))
 }
 
 /// The prediction for samples of three classes, so many of each, taken as those of one variable; none of none.

@@ -4,6 +4,7 @@
 //! [`check`]. [`patches`] does so for the patches of a chart.
 
 mod assessment;
+mod cells;
 pub mod check;
 mod deviates;
 mod expectation;

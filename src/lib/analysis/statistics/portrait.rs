@@ -309,8 +309,8 @@ impl Foreseen {
                     correlations: Some([correlation(row), correlation(column)]),
                 }
             }
-            FramePrediction::Groups(groups) => {
-                let MeanVariance { mean, variance } = pooled(groups)[index].moments;
+            FramePrediction::Groups(sites) => {
+                let MeanVariance { mean, variance } = pooled(&sites.groups)[index].moments;
                 Self::of_moments(mean, variance)
             }
             FramePrediction::Pixels(mixture) => Self::of_pixels(mixture, index, patches),

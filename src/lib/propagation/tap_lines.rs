@@ -1,0 +1,106 @@
+//! What photosites of a row, or of a column, share where several amplifiers read them.
+//!
+//! The reading of a photosite of class k behind amplifier a is y_ak(x, u, v), x what is its own, u and v what its row has
+//! ([`lines`](super::lines)); amplifiers differ by what they make of a charge, and the row is the same to all, so that
+//!
+//! cov(y_ak, y_bl) = cov(m_ak(u, v), m_bl(u, v)),  m_ak(u, v) = E\[y_ak | u, v]
+//!
+//! and so for columns. Where codes follow straight each has its own slope, g_ak g_bl \[σ² + E_k E_l s²].
+
+use super::line_sums::curved;
+use super::lines::{Axis, TAPPED_DRIFT};
+use super::moments::Prediction;
+use super::photosite::Photosite;
+use super::unpredictable::{Predicted, Unpredictable};
+use crate::metadata::AverageRecord;
+use nalgebra::{DMatrix, Matrix3};
+
+/// Photosites of an amplifier, and the signal electrons that R, G and B of them expect.
+pub(super) type Lit = (Photosite, [f64; 3]);
+
+/// Covariances of photosites that share a row, and of those that share a column, by amplifiers and classes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapLines {
+    /// Of two in a row: class k of the group g stands at 3 g + k.
+    pub row: DMatrix<f64>,
+    /// Of two in a column.
+    pub column: DMatrix<f64>,
+    /// Of three planes: what samples of one place share beyond what they do by row and by column, by group.
+    pub together: Vec<Matrix3<f64>>,
+}
+
+impl TapLines {
+    /// Of photosites of such moments behind each of some amplifiers, of an average of exposures where there is one; none where they share
+    /// nothing.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpredictable::Beyond`] where no formula tells.
+    pub(super) fn of(
+        sites: &[Lit],
+        moments: &[[Prediction; 3]],
+        average: Option<&AverageRecord>,
+    ) -> Predicted<Option<Self>> {
+        if !sites.iter().any(|(photosite, _)| photosite.has_lines()) {
+            return Ok(None);
+        }
+        if sites.iter().any(|(photosite, _)| photosite.drifts()) {
+            return Err(Unpredictable::Beyond(TAPPED_DRIFT));
+        }
+        let mut whole = shared(sites)?;
+        if let Some(record) = average {
+            let one = sites.iter().map(|(photosite, expected_e)| (photosite.one_exposure(), *expected_e));
+            let one: Vec<Lit> = one.collect();
+            let temporal = shared(&one)?.into_iter().zip(fixed(&one)?).map(|(whole, fixed)| whole - fixed);
+            let off = 1.0 - 1.0 / f64::from(record.frames.max(1));
+            whole.iter_mut().zip(temporal).for_each(|(whole, temporal)| *whole -= off * temporal);
+        }
+        let [row, column] = whole;
+        let together = |sites: &[Prediction; 3]| Matrix3::from_fn(|k, l| sites[k].lines.together[l]);
+        Ok(Some(Self { row, column, together: moments.iter().map(together).collect() }))
+    }
+
+    /// What of that is the same in every exposure.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::of`].
+    pub(super) fn fixed(sites: &[Lit]) -> Predicted<Self> {
+        let [row, column] = fixed(sites)?;
+        Ok(Self { row, column, together: vec![Matrix3::zeros(); sites.len()] })
+    }
+
+    /// The matrices of rows and of columns.
+    pub fn axes(&self) -> [&DMatrix<f64>; 2] {
+        [&self.row, &self.column]
+    }
+
+    /// What of the variance of photosites that stand at such a place is their own.
+    pub fn own(&self, at: usize, variance: f64) -> f64 {
+        (variance - self.row[(at, at)] - self.column[(at, at)]).max(0.0)
+    }
+}
+
+fn fixed(sites: &[Lit]) -> Predicted<[DMatrix<f64>; 2]> {
+    let means = sites.iter().map(|(photosite, expected_e)| (photosite.over_exposures(), *expected_e));
+    shared(&means.collect::<Vec<_>>())
+}
+
+/// Covariances in a row, and in a column.
+fn shared(sites: &[Lit]) -> Predicted<[DMatrix<f64>; 2]> {
+    let slopes = sites.iter().map(|(photosite, expected_e)| photosite.line_slopes(*expected_e));
+    let slopes = slopes.collect::<Predicted<Option<Vec<_>>>>()?;
+    let (Some(slopes), Some((first, _))) = (slopes, sites.first()) else {
+        return Ok([curved(sites, &[Axis::Row])?, curved(sites, &[Axis::Column])?]);
+    };
+    let signals: Vec<[f64; 3]> =
+        sites.iter().map(|(photosite, expected_e)| photosite.line_signals(*expected_e)).collect();
+    Ok(Axis::ALL.map(|axis| {
+        let terms = first.terms(axis);
+        let at = |index: usize| {
+            let (group, class) = (index / 3, index % 3);
+            (signals[group][class], slopes[group].map(|slopes| slopes[class]))
+        };
+        DMatrix::from_fn(3 * sites.len(), 3 * sites.len(), |a, b| terms.between(at(a), at(b)))
+    }))
+}

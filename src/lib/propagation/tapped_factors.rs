@@ -1,0 +1,175 @@
+//! What photosites of several amplifiers share by rows or by columns, as sums over independent factors, and what pixels that are made
+//! of them have of these.
+//!
+//! The covariance R of two photosites of a row, by amplifiers and classes, is Σ_ρ λ_ρ u_ρ u_ρᵀ. Pixel a has of the factor ρ of row r what its
+//! photosites there have, ℓ_a(r, ρ) = Σ_s w_a(s) u_ρ(s); so pixels a and b, however far apart in it, share Σ_rρ λ_ρ ℓ_a(r, ρ) ℓ_b(r, ρ)ᵀ.
+
+use super::moments::Prediction;
+use super::tap_lines::TapLines;
+use crate::stages::demosaic::stencil::REACH;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+/// Independent factors of what photosites of a line share.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Factors {
+    /// Their variances.
+    pub values: Vec<f64>,
+    /// What a photosite has of each, by amplifier and class, 3 a + k.
+    loads: Vec<Vec<f64>>,
+}
+
+impl Factors {
+    /// Of the covariances of photosites of groups, which are of such amplifiers.
+    pub fn of(covariance: &DMatrix<f64>, taps: &[usize]) -> Self {
+        let found = covariance.clone().symmetric_eigen();
+        let most = found.eigenvalues.amax();
+        let count = 3 * taps.iter().map(|tap| tap + 1).max().unwrap_or_default();
+        let mut factors = Self { values: Vec::new(), loads: Vec::new() };
+        for (value, vector) in found.eigenvalues.iter().zip(found.eigenvectors.column_iter()) {
+            // What is left of a matrix of lower rank is rounding.
+            if value.abs() <= 1e-15 * most {
+                continue;
+            }
+            let mut loads = vec![0.0; count];
+            for (group, tap) in taps.iter().enumerate() {
+                (0..3).for_each(|class| loads[3 * tap + class] = vector[3 * group + class]);
+            }
+            factors.values.push(*value);
+            factors.loads.push(loads);
+        }
+        factors
+    }
+
+    /// One factor, of which photosites have so much by amplifier and class.
+    pub fn single(taps: usize, load: impl Fn(usize, usize) -> f64) -> Self {
+        let loads = (0..3 * taps).map(|at| load(at / 3, at % 3)).collect();
+        Self { values: vec![1.0], loads: vec![loads] }
+    }
+
+    /// None.
+    pub fn none() -> Self {
+        Self { values: Vec::new(), loads: Vec::new() }
+    }
+
+    /// What pixels have of each, `sites` being their photosites: how many lines they are away, of which amplifier and class, and their
+    /// weights.
+    pub fn of_pixel(&self, sites: impl Iterator<Item = (isize, [usize; 2], [f64; 3])>) -> Loads {
+        let rank = self.values.len();
+        let mut found = vec![[0.0; 3]; LINES * rank];
+        for (offset, [tap, class], weights) in sites {
+            let line = (offset + REACH).cast_unsigned();
+            for (sums, loads) in found[line * rank..][..rank].iter_mut().zip(&self.loads) {
+                let load = loads.get(3 * tap + class).copied().unwrap_or_default();
+                sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight * load);
+            }
+        }
+        Loads { rank, loads: found }
+    }
+}
+
+impl Factors {
+    /// What two photosites share, each by amplifier and class.
+    pub fn between(&self, [tap, class]: [usize; 2], [other, of_other]: [usize; 2]) -> f64 {
+        let load = |loads: &Vec<f64>, at: usize| loads.get(at).copied().unwrap_or_default();
+        let both = |loads: &Vec<f64>| load(loads, 3 * tap + class) * load(loads, 3 * other + of_other);
+        self.values.iter().zip(&self.loads).map(|(value, loads)| value * both(loads)).sum()
+    }
+}
+
+/// Lines that a pixel reaches.
+const LINES: usize = 2 * REACH.unsigned_abs() + 1;
+
+/// What the channels of a pixel have of the factors of each line around it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Loads {
+    rank: usize,
+    loads: Vec<[f64; 3]>,
+}
+
+impl Loads {
+    /// Of the line so far away, by factor; of none that is out of reach.
+    pub fn at(&self, offset: isize) -> &[[f64; 3]] {
+        match offset.abs() <= REACH {
+            true => &self.loads[(offset + REACH).cast_unsigned() * self.rank..][..self.rank],
+            false => &[],
+        }
+    }
+
+    /// What the channels (rows) share with those of a pixel `lag` lines away (columns), by factors of such variances.
+    pub fn covariance(&self, other: &Self, lag: isize, values: &[f64]) -> Matrix3<f64> {
+        let mut found = Matrix3::zeros();
+        for offset in (-REACH).max(lag - REACH)..=REACH.min(lag + REACH) {
+            for ((mine, theirs), value) in self.at(offset).iter().zip(other.at(offset - lag)).zip(values) {
+                if *mine != [0.0; 3] && *theirs != [0.0; 3] {
+                    found += *value * Vector3::from(*mine) * Vector3::from(*theirs).transpose();
+                }
+            }
+        }
+        found
+    }
+}
+
+/// A photosite of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Site {
+    pub offset: [isize; 2],
+    pub class: usize,
+    pub tap: usize,
+    /// What is its own.
+    pub variance: f64,
+    /// What it gives to the channels, to first order.
+    pub weights: [f64; 3],
+}
+
+pub(super) fn product(a: &[f64; 3], b: &[f64; 3]) -> Matrix3<f64> {
+    Vector3::from(*a) * Vector3::from(*b).transpose()
+}
+
+/// What a pixel of such photosites has of what they share by an axis.
+pub(super) fn loads(sites: &[Site], factors: &Factors, axis: usize) -> Loads {
+    factors.of_pixel(sites.iter().map(|site| (site.offset[1 - axis], [site.tap, site.class], site.weights)))
+}
+
+/// To first order, the covariance of a pixel of photosites that have such variances by themselves, and share such factors.
+pub(super) fn first_order(sites: &[Site], own: impl Fn(&Site) -> f64, factors: Option<&[Factors; 2]>) -> Matrix3<f64> {
+    let own: Matrix3<f64> = sites.iter().map(|site| own(site) * product(&site.weights, &site.weights)).sum();
+    let of_axis = |axis: usize, factors: &Factors| {
+        let loads = loads(sites, factors, axis);
+        loads.covariance(&loads, 0, &factors.values)
+    };
+    let shared = factors.map(|factors| of_axis(0, &factors[0]) + of_axis(1, &factors[1]));
+    shared.map_or(own, |shared| own + shared)
+}
+
+/// The means that photosites have over exposures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OverExposures {
+    /// By amplifier.
+    pub(super) sites: Vec<[Prediction; 3]>,
+    own: Vec<[f64; 3]>,
+    factors: Option<[Factors; 2]>,
+}
+
+impl OverExposures {
+    /// Of photosites of amplifiers, whose means have such moments and share such rows and columns.
+    pub fn of(groups: &[(usize, [Prediction; 3])], lines: Option<&TapLines>) -> Self {
+        let count = groups.iter().map(|(tap, _)| tap + 1).max().unwrap_or_default();
+        let none = [Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0); 3];
+        let (mut sites, mut own) = (vec![none; count], vec![[0.0; 3]; count]);
+        for (index, (tap, means)) in groups.iter().enumerate() {
+            sites[*tap] = *means;
+            own[*tap] = [0, 1, 2].map(|class| {
+                let variance = means[class].moments.variance;
+                lines.map_or(variance, |lines| lines.own(3 * index + class, variance))
+            });
+        }
+        let taps: Vec<usize> = groups.iter().map(|(tap, _)| *tap).collect();
+        let factors = lines.map(|lines| lines.axes().map(|line| Factors::of(line, &taps)));
+        Self { sites, own, factors }
+    }
+
+    /// To first order, the covariance of a pixel of such photosites.
+    pub(super) fn first_order(&self, sites: &[Site]) -> Matrix3<f64> {
+        first_order(sites, |site| self.own[site.tap][site.class], self.factors.as_ref())
+    }
+}
