@@ -410,7 +410,7 @@ fn a_figure_magnifies_no_rounding() {
     let bytes: Vec<u8> =
         (0..64 * 48).flat_map(|place| if place == 99 { 1.0 } else { f32::NAN }.to_le_bytes()).collect();
     std::fs::write(shop.path("a.bin"), bytes).unwrap();
-    shop.run("measure --raw 64x48:f32le a.bin --plot plot.svg", &[]);
+    shop.run("measure -q --raw 64x48:f32le a.bin --plot plot.svg", &[]);
     let seen = words(&String::from_utf8(shop.bytes("plot.svg")).unwrap());
     assert!(seen.contains("99.97 % are not finite"), "{seen}");
     shop.run("render-radiance --electrons 8000.3,12000.7,9500.1 --size 32x24 -o expected.exr", &[]);
@@ -424,7 +424,8 @@ fn a_figure_magnifies_no_rounding() {
 fn bins_of_whole_numbers_are_alike() {
     for quantity in [QuantityKind::Adu, QuantityKind::Unspecified] {
         let head = header(quantity, Geometry::new(256, 8, &["Y"]));
-        let (report, portrait) = drawn(&frame(head, |x, _, _| x as f32), &[Region { x: 0, y: 0, width: 256, height: 8 }]);
+        let (report, portrait) =
+            drawn(&frame(head, |x, _, _| x as f32), &[Region { x: 0, y: 0, width: 256, height: 8 }]);
         let plot = cyanometer::report::portrait(&portrait, &report.regions[0]);
         let Marks::Line(steps) = &plot.panels[0].series[0].marks else { panic!("{:?}", plot.panels[0].series) };
         assert!(steps.iter().all(|[_, density]| (density * 256.0 - 1.0).abs() < 1e-9), "{quantity}: {steps:?}");

@@ -107,8 +107,8 @@ fn pipes_and_half_floats_are_scaled_too() {
 fn the_scale_is_that_of_the_file_itself() {
     let bench = set_up();
     bench.run("render-radiance --electrons 3000,5000,7000 --size 32x24 -o rates.exr", &[]);
-    bench.run("digitize rates.exr -o codes.tiff", &[]);
-    bench.run("digitize rates.exr --viewable -o shown.tiff", &[]);
+    bench.run("digitize rates.exr -q -o codes.tiff", &[]);
+    bench.run("digitize rates.exr -q --viewable -o shown.tiff", &[]);
     let expected = samples(&bench.path("codes.tiff"));
     fs::copy(bench.path("codes.tiff.yaml"), bench.path("shown.tiff.yaml")).unwrap();
     assert_eq!(samples(&bench.path("shown.tiff")), expected);
@@ -120,7 +120,7 @@ fn the_scale_is_that_of_the_file_itself() {
 fn what_cannot_be_scaled_is_refused() {
     let bench = set_up();
     bench.run("render-radiance --electrons 3000,5000,7000 --size 32x24 -o rates.exr", &[]);
-    bench.run("digitize rates.exr -o codes.exr", &[]);
+    bench.run("digitize rates.exr -q -o codes.exr", &[]);
     bench.run("mosaic codes.exr -o plane.exr", &[]);
     bench.run("demosaic plane.exr -o rgb.exr", &[]);
     for (line, complaint) in [

@@ -16,8 +16,9 @@ fn of_file<'a>(argument: &str, words: &'a [String]) -> Option<&'a str> {
     words.iter().find(is_one).filter(|_| argument.starts_with('-')).map(String::as_str)
 }
 
-/// What to say of a file too many: the option that takes it where it is a file of ours, or how many the program takes.
-fn too_many(argument: &str, command: &Command) -> Option<String> {
+/// What to say of a file too many, where it may be no output: the option that takes it where it is a file of ours, or how many the program
+/// takes.
+fn too_many(argument: &str, command: &Command, words: &[String]) -> Option<String> {
     if argument.starts_with('-') || !Path::new(argument).is_file() {
         return None;
     }
@@ -33,6 +34,9 @@ fn too_many(argument: &str, command: &Command) -> Option<String> {
             let all = if others.is_empty() { (*last).to_owned() } else { format!("{} or {last}", others.join(", ")) };
             return Some(format!("a YAML file is the value of {all}"));
         }
+    }
+    if told.is_none() && output_hint(argument, command, words).is_some() {
+        return None;
     }
     match command.get_positionals().count() {
         1 => Some("the program takes one input".into()),
@@ -57,8 +61,8 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
     let problem = match error.kind() {
         ErrorKind::UnknownArgument => {
             let hint = in_words(meant(&argument, command, words).or_else(|| near_option(&argument, command)));
-            let hint = too_many(&argument, command).map_or(hint, |taken| format!("; {taken}"));
             let hint = output_hint(&argument, command, words).map_or(hint, |output| format!("; {output}"));
+            let hint = too_many(&argument, command, words).map_or(hint, |taken| format!("; {taken}"));
             let hint = in_quotes(&argument, command, words).map_or(hint, |quoted| format!("; write {quoted}"));
             let hint = of_file(&argument, words).map_or(hint, |file| format!("; for the file write `./{file}`"));
             let hint = if argument.strip_prefix("--") == Some("list") { LISTS_OF_DATA.to_owned() } else { hint };

@@ -915,7 +915,10 @@ mod tests {
         }
         let spoken_of = refused("# irradiance at ground, W/(m2 nm)\nnm,E\n400,1\n", None);
         assert!(spoken_of.contains("its comments speak of `W/(m2 nm)`, an irradiance"), "{spoken_of}");
-        assert!(spoken_of.contains("those of one direction") && spoken_of.ends_with("radiances after all"), "{spoken_of}");
+        assert!(
+            spoken_of.contains("those of one direction") && spoken_of.ends_with("radiances after all"),
+            "{spoken_of}"
+        );
         for text in [
             "nm,irradiance (W m-2 sr-1 nm-1)\n400,1e-3\n",
             "nm,irradiance\nnm,W m-2 sr-1 nm-1\n400,1e-3\n",

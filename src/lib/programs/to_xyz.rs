@@ -68,8 +68,8 @@ fn convert(
     session.tell(&notes);
     session.sign(stage.header_mut());
     if *sigma {
-        session.tell(requests::of_undrawn(reader.header()).as_slice());
         let stage = WithSigma::of_conversion(stage, reader.header())?;
+        session.tell(requests::of_undrawn(reader.header()).as_slice());
         session.drive(reader, &stage, output)
     } else {
         session.drive(reader, &stage, output)

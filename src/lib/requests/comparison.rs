@@ -121,11 +121,14 @@ impl ColorPair {
             let option: &[_] = if crop.is_some() { &["crop"] } else { &["part"] };
             return Err(Error::Usage("both are colors, of which there are no parts".into()).leave_out(option));
         }
-        let is_negative = |side: &&FrameOrColor| matches!(side, FrameOrColor::Color(color) if color.iter().any(|x| *x < 0.0));
+        let is_negative =
+            |side: &&FrameOrColor| matches!(side, FrameOrColor::Color(color) if color.iter().any(|x| *x < 0.0));
         if let Some(FrameOrColor::Color([x, y, z])) = [&self.a, &self.b].into_iter().find(is_negative)
             && space != Some(Space::Lab)
         {
-            let problem = format!("{x},{y},{z} is no color in XYZ: X, Y and Z are not negative; L,a,b are given with --space lab");
+            let problem = format!(
+                "{x},{y},{z} is no color in XYZ: X, Y and Z are not negative; L,a,b are given with --space lab"
+            );
             return Err(Error::Usage(problem));
         }
         let settings = ComparisonSettings { space, white, white_luminance };

@@ -183,7 +183,10 @@ mod tests {
                     *count as f64 / (end - merged.begin(*bin))
                 };
                 let seen: Vec<f64> = merged.counts.iter().map(|(bin, count)| density(bin, count)).collect();
-                assert!(seen.iter().all(|one| (one * step - 1.0).abs() < 1e-9 || step > 1.0), "{is_codes} {times}: {seen:?}");
+                assert!(
+                    seen.iter().all(|one| (one * step - 1.0).abs() < 1e-9 || step > 1.0),
+                    "{is_codes} {times}: {seen:?}"
+                );
                 assert!(merged.begin(0) <= 0.0 && merged.width.fract() == 0.0, "{times}: {}", merged.width);
                 assert_eq!(merged.total(), 256);
             }

@@ -20,8 +20,8 @@ pub(super) fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
     let density = if scale.unit.is_empty() { "density".to_owned() } else { format!("share per {}", scale.unit) };
     let x = Axis::linear(&scale.with_unit(words_of_reference(portrait)));
     let mut panel = Panel::new(x, Axis::linear(&density));
-    let groups: Vec<Bins> = 
-        scale.groups(portrait).filter_map(|(color, group)| Bins::of(color, group, portrait.is_whole)).collect();
+    let groups: Vec<Bins> =
+        scale.groups(portrait).filter_map(|(color, group)| Bins::of(color, group, portrait.has_whole)).collect();
     // One window for all: what it shows of a class is not beyond it.
     let window = groups.iter().map(Bins::window).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(|[low, high]| {
         let room = ROOM * (high - low);
@@ -99,15 +99,15 @@ struct Bins<'a> {
 }
 
 impl<'a> Bins<'a> {
-    fn of(color: Color, group: &'a Likeness, is_whole: bool) -> Option<Self> {
+    fn of(color: Color, group: &'a Likeness, has_whole: bool) -> Option<Self> {
         let reference = reference(group)?;
-        let finest = if is_whole { &group.histogram.of_whole() } else { &group.histogram };
+        let finest = if has_whole { &group.histogram.of_whole() } else { &group.histogram };
         let [from, to] = finest.middle(LEFT_OUT)?;
         #[expect(clippy::cast_possible_truncation, reason = "a few bins; casts saturate")]
         let times = (((to - from) / BINS / finest.width).round() as i64).max(1);
-        let bins = if is_whole { finest.merged_within(times) } else { finest.merged(times) };
+        let bins = if has_whole { finest.merged_within(times) } else { finest.merged(times) };
         let [lowest, highest] = finest.ends;
-        let reach = if is_whole { [lowest - 0.5, highest + 0.5] } else { [f64::NEG_INFINITY, f64::INFINITY] };
+        let reach = if has_whole { [lowest - 0.5, highest + 0.5] } else { [f64::NEG_INFINITY, f64::INFINITY] };
         let room = BEYOND * (to - from) + bins.width;
         let is_own = |bin: &&i64| (from - room..to + room).contains(&bins.begin(**bin));
         let (first, last) = (bins.counts.keys().find(is_own)?, bins.counts.keys().rfind(is_own)?);

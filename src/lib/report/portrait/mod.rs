@@ -142,7 +142,7 @@ fn profile(portrait: &Portrait, scale: &Scale, axis: usize) -> Panel {
         panel.y = panel.y.range(low, high).widened(MARGIN);
     }
     let extremes = means.iter().copied().chain(bands.iter().map(|(_, std, _)| *std)).fold(0.0, farther).abs();
-    if extremes < FINEST_STEPS * finest {
+    if extremes > 0.0 && extremes < FINEST_STEPS * finest {
         panel.y = panel.y.range(-FINEST_STEPS * finest, FINEST_STEPS * finest);
     }
     if !bands.is_empty() {
