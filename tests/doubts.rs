@@ -443,7 +443,7 @@ fn attributes_of_files_are_heard() {
         [1.0_f32, 200.0].map(|white| [b"whiteLuminance\0float\0\x04\0\0\0", &white.to_le_bytes()[..]].concat());
     let names: [(&[u8], &[u8]); 2] = [(b"chromaticities\0", b"chromaticitiez\0"), (b"cyanometer\0", b"cyanometeR\0")];
     patch(&shop, "xyz.exr", "picture.exr", &[(&from, &other), names[0], names[1]]);
-    let told = "its white has 200 cd/m2 by its whiteLuminance";
+    let told = "its white has 200 cd/m2 by its own attribute (whiteLuminance)";
     let said = shop.said("render-radiance picture.exr --expose-to 0.5 -v -o a.exr", 0);
     assert!(said.contains(told), "{said}");
     let said = shop.said("render-radiance picture.exr --luminance 1000 --expose-to 0.5 -o a.exr", 0);
@@ -472,4 +472,28 @@ fn black_levels_by_site_are_held_against_tags() {
     let told = "changed.dng: its black levels in ADU are [1757.0, 1757.0, 60.0, 60.0], but [1757.30";
     assert!(said.contains(told) && said.contains("by the tags of the file, which do not count"), "{said}");
     assert!(!shop.said("measure plane.dng", 0).contains("by the tags"));
+}
+
+/// Linear sRGB and sRGB of ours are pictures whose white is as bright as they say.
+#[test]
+fn pictures_of_ours_tell_their_white() {
+    let shop = Workshop::new();
+    shop.run("fit-matrix sky912.exr -o m.yaml", &[]);
+    shop.pipe(
+        "render-radiance clear_zenith.csv --size 16x12 --expose-to 0.5 --cfa rggb --quiet | add-noise | digitize | demosaic | to-xyz \
+         --matrix m.yaml -o xyz.exr --quiet",
+    );
+    for (space, name) in [("linear-srgb", "lin.exr"), ("linear-srgb", "lin.tiff"), ("srgb", "s.tiff")] {
+        shop.run(&format!("to-xyz xyz.exr --space {space} --white-luminance 4000 -o {name}"), &[]);
+        let said = shop.said(&format!("render-radiance {name} --expose-to 0.5 -v -o scene.exr"), 0);
+        let encoding = if space == "srgb" { "srgb" } else { "linear" };
+        assert!(said.contains(&format!("are taken as {encoding}, its primaries as srgb")), "{said}");
+        assert!(said.contains(&format!("{name}: its white has 4000 cd/m2 by its own metadata")), "{said}");
+        assert!(!said.contains("warning: "), "{said}");
+        assert_eq!(shop.sidecar("scene.exr").scene.unwrap().upsampling.unwrap().white_luminance, 4000.0);
+        let said = shop.said(&format!("render-radiance {name} --luminance 500 --expose-to 0.5 -o scene.exr"), 0);
+        assert!(said.contains("4000 cd/m2 by its own metadata, and 500 by --luminance, which counts"), "{said}");
+    }
+    let attribute = [b"whiteLuminance\0float\0\x04\0\0\0", &4000.0_f32.to_le_bytes()[..]].concat();
+    assert!(shop.bytes("lin.exr").windows(attribute.len()).any(|window| window == attribute));
 }

@@ -188,7 +188,7 @@ fn a_filter_array_has_one_option_by_two_names() {
             let input = if ["add-noise", "digitize", "measure"].contains(&program) { "one.exr" } else { "codes.exr" };
             shop.pipe("add-noise one.exr | digitize -o codes.exr");
             let black = if program == "correct-frame" { "--black auto" } else { "" };
-            shop.run(format!("{program} {input} {option} {made} {black}").trim_end(), &[]);
+            shop.run(format!("{program} -q {input} {option} {made} {black}").trim_end(), &[]);
         }
     }
     for line in [

@@ -9,7 +9,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 134] = [
+const MISTAKES: [(&str, i32, &str); 139] = [
     (
         "preview codes.exr plane.exr -o {steam}.png",
         BAD_USAGE,
@@ -48,6 +48,22 @@ const MISTAKES: [(&str, i32, &str); 134] = [
         "render-radiance --dark --sensor codes.exr",
         BAD_DATA,
         "codes.exr: its name ends neither in .yaml, as those of sensor files do, nor in .csv, as those of responses; is it another file?",
+    ),
+    (
+        "measure codes.exr -o report.docx",
+        BAD_USAGE,
+        "no report is written as .docx; there are text, json, yaml, csv; give another --output",
+    ),
+    (
+        "predict-noise uvspec.csv noisy.exr.yaml",
+        BAD_USAGE,
+        "unknown option or extra argument `noisy.exr.yaml`; the program takes one input; see `predict-noise --help`",
+    ),
+    (
+        "predict-noise uvspec.csv ./matrix.yaml",
+        BAD_USAGE,
+        "unknown option or extra argument `./matrix.yaml`; it is a matrix file: give it as `--matrix ./matrix.yaml`; see \
+         `predict-noise --help`",
     ),
     (
         "measure codes.exr -o codes.xlsx",
@@ -181,7 +197,7 @@ const MISTAKES: [(&str, i32, &str); 134] = [
         "render-radiance uvspec.csv",
         BAD_DATA,
         "uvspec.csv: column `edir`: its values are in `edir`, an irradiance, which has no sr-1; spectral radiances are wanted, in units such as \
-         W m-2 sr-1 nm-1: take those of one direction from where these come from; of a matt white surface they are the irradiance \
+         W m-2 sr-1 nm-1: take those of one direction from where these come from, as `uu` of uvspec; of a matt white surface they are the irradiance \
          over pi; `uu` may hold them: choose it with --column 'uu'",
     ),
     (
@@ -470,6 +486,16 @@ const MISTAKES: [(&str, i32, &str); 134] = [
         "measure --patches=4x3 noisy.exr --region 0,0,1,1",
         BAD_USAGE,
         "--patches[=<WxH>] and --region <X,Y,W,H> exclude each other; see `measure --help`",
+    ),
+    (
+        "color-difference 50,2.67,-79.8 50,0,-82.7",
+        BAD_USAGE,
+        "50,2.67,-79.8 is no color in XYZ: X, Y and Z are not negative; L,a,b are given with --space lab",
+    ),
+    (
+        "color-difference xyz.exr xyz.exr xyz.exr",
+        BAD_USAGE,
+        "unknown option or extra argument `xyz.exr`; the program takes two inputs; see `color-difference --help`",
     ),
     (
         "color-difference a.exr b.exr c.exr",

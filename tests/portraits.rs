@@ -4,6 +4,7 @@ use crate::support;
 use cyanometer::analysis::statistics::portrait::{LAGS, Portrait};
 use cyanometer::analysis::statistics::{Laws, Region, Report, Saturated, measure_with_portrait};
 use cyanometer::frame::Geometry;
+use cyanometer::plot::Marks;
 use cyanometer::propagation::Equations;
 use cyanometer::stream::MemoryFrame;
 use cyanometer::units::QuantityKind;
@@ -400,4 +401,36 @@ fn a_figure_says_where_it_is_of_and_what_is_left_out() {
     assert!(part.contains(">45<") || part.contains(">40<"), "{part}");
     let full = figure(" --region 4,0,12,8");
     assert!(!full.contains("not finite"), "{full}");
+}
+
+/// Of 3072 samples 3071 are not finite, which is not all; and means of samples that are alike scatter by nothing that a float can tell.
+#[test]
+fn a_figure_magnifies_no_rounding() {
+    let shop = Workshop::new();
+    let bytes: Vec<u8> =
+        (0..64 * 48).flat_map(|place| if place == 99 { 1.0 } else { f32::NAN }.to_le_bytes()).collect();
+    std::fs::write(shop.path("a.bin"), bytes).unwrap();
+    shop.run("measure -q --raw 64x48:f32le a.bin --plot plot.svg", &[]);
+    let seen = words(&String::from_utf8(shop.bytes("plot.svg")).unwrap());
+    assert!(seen.contains("99.97 % are not finite"), "{seen}");
+    shop.run("render-radiance --electrons 8000.3,12000.7,9500.1 --size 32x24 -o expected.exr", &[]);
+    shop.run("measure expected.exr --plot plot.svg", &[]);
+    let seen = words(&String::from_utf8(shop.bytes("plot.svg")).unwrap());
+    assert!(seen.contains("mean − predicted mean") && !seen.contains("10⁻"), "{seen}");
+}
+
+/// A ramp through all codes of eight bits, one column each, is as high at its ends as elsewhere, be they called codes or not.
+#[test]
+fn bins_of_whole_numbers_are_alike() {
+    for quantity in [QuantityKind::Adu, QuantityKind::Unspecified] {
+        let head = header(quantity, Geometry::new(256, 8, &["Y"]));
+        let (report, portrait) =
+            drawn(&frame(head, |x, _, _| x as f32), &[Region { x: 0, y: 0, width: 256, height: 8 }]);
+        let plot = cyanometer::report::portrait(&portrait, &report.regions[0]);
+        let Marks::Line(steps) = &plot.panels[0].series[0].marks else { panic!("{:?}", plot.panels[0].series) };
+        assert!(steps.iter().all(|[_, density]| (density * 256.0 - 1.0).abs() < 1e-9), "{quantity}: {steps:?}");
+        assert_eq!([steps[0][0], steps[steps.len() - 1][0]], [-128.0, 128.0]);
+        let widths: Vec<f64> = steps.chunks_exact(2).map(|ends| ends[1][0] - ends[0][0]).collect();
+        assert!(widths.iter().all(|width| *width == widths[0] && width.fract() == 0.0), "{widths:?}");
+    }
 }

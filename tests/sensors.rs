@@ -391,7 +391,7 @@ fn a_program_says_which_key_it_lacks() {
     bench.run("render-radiance --electrons 10,20,30 --size 8x6 --sensor ./mono.yaml -o mono.exr");
     // Without read-out a sensor has no pattern: rggb.
     bench.run("mosaic rates.exr -o rates-plane.exr");
-    bench.run("digitize rates-plane.exr --bits 12 --bias 5 --slope 1 -o codes.exr");
+    bench.run("digitize rates-plane.exr -q --bits 12 --bias 5 --slope 1 -o codes.exr");
     for (line, complaint) in COMPLAINTS {
         let output = bench.attempt(line);
         let program = line.split(' ').next().unwrap();

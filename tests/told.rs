@@ -827,3 +827,28 @@ fn exposures_of_several_sensitivities_do_not_go_together() {
     let transfer = shop.said("photon-transfer .", BAD_DATA);
     assert!(transfer.contains("flat2.exr: its sensitivity (ISO) is not that of ./flat1.exr"), "{transfer}");
 }
+
+/// Who forgets `add-noise` hears of it where codes are made and where error bars are, each once; a clean frame is meant to have none.
+#[test]
+fn noise_that_was_not_drawn_is_told() {
+    let shop = Workshop::new();
+    shop.run("fit-matrix sky912.exr -o m.yaml", &[]);
+    shop.run("render-radiance --electrons 900,1500,1200 --size 12x8 -o scene.exr", &[]);
+    fs::copy(shop.path("scene.exr"), shop.path("other.exr")).unwrap();
+    let codes =
+        "digitize: warning: no noise was drawn: these are codes of what is expected; `add-noise` comes before\n";
+    let bars = "warning: no noise was drawn; the standard deviations are those of noisy frames of the same scene\n";
+    assert_eq!(shop.said("digitize scene.exr other.exr -o {stem}-codes.exr", 0), codes);
+    shop.run("mosaic scene-codes.exr -o plane.exr", &[]);
+    assert_eq!(shop.said("demosaic plane.exr -o rgb.exr", 0), "");
+    assert_eq!(shop.said("demosaic plane.exr --sigma -o bars.exr", 0), format!("demosaic: {bars}"));
+    assert_eq!(shop.said("to-xyz rgb.exr --matrix m.yaml -o xyz.exr", 0), "");
+    assert_eq!(shop.said("to-xyz rgb.exr --matrix m.yaml --sigma -o xyz.exr", 0), format!("to-xyz: {bars}"));
+    assert_eq!(shop.said("to-xyz bars.exr --matrix m.yaml --sigma -o xyz.exr", 0), "");
+    for drawn in ["--seed 7", "--clean"] {
+        shop.run(&format!("add-noise scene.exr {drawn} -o drawn.exr"), &[]);
+        assert_eq!(shop.said("digitize drawn.exr -o drawn-codes.exr", 0), "");
+        shop.run("mosaic drawn-codes.exr -o plane.exr", &[]);
+        assert_eq!(shop.said("demosaic plane.exr --sigma -o bars.exr", 0), "");
+    }
+}

@@ -113,8 +113,8 @@ fn pipes_and_half_floats_are_scaled_too() {
 fn the_scale_is_that_of_the_file_itself() {
     let bench = set_up();
     bench.run("render-radiance --electrons 3000,5000,7000 --size 32x24 -o rates.exr", &[]);
-    bench.run("digitize rates.exr -o codes.tiff", &[]);
-    bench.run("digitize rates.exr --viewable -o shown.tiff", &[]);
+    bench.run("digitize rates.exr -q -o codes.tiff", &[]);
+    bench.run("digitize rates.exr -q --viewable -o shown.tiff", &[]);
     let expected = samples(&bench.path("codes.tiff"));
     fs::copy(bench.path("codes.tiff.yaml"), bench.path("shown.tiff.yaml")).unwrap();
     assert_eq!(samples(&bench.path("shown.tiff")), expected);
@@ -126,7 +126,7 @@ fn the_scale_is_that_of_the_file_itself() {
 fn what_cannot_be_scaled_is_refused() {
     let bench = set_up();
     bench.run("render-radiance --electrons 3000,5000,7000 --size 32x24 -o rates.exr", &[]);
-    bench.run("digitize rates.exr -o codes.exr", &[]);
+    bench.run("digitize rates.exr -q -o codes.exr", &[]);
     bench.run("mosaic codes.exr -o plane.exr", &[]);
     bench.run("demosaic plane.exr -o rgb.exr", &[]);
     for (line, complaint) in [
@@ -190,4 +190,27 @@ fn a_scale_that_cannot_be_is_refused_wherever_it_stands() {
         let wanted = format!("given.yaml: its `sample_scale`, {scale}, is no power of two");
         assert_eq!((output.status.success(), said.contains(&wanted)), (!is_refused, is_refused), "{said}");
     }
+}
+
+/// The white of XYZ that are there already can be named: it is recorded, and they are scaled by it.
+#[test]
+fn a_white_of_xyz_is_recorded_and_scales_them() {
+    let bench = set_up();
+    let xyz = [[50.0, 60.0, 70.0], [1.0, 2.0, 3.0]];
+    bench.write_colors("xyz.exr", cyanometer::units::QuantityKind::Xyz, &xyz);
+    let white = |name: &str| bench.sidecar(name).color.and_then(|color| color.white);
+    bench.run("to-xyz xyz.exr -o same.exr", &[]);
+    assert_eq!(white("same.exr"), None);
+    for (option, scale, luminance) in
+        [("--white-luminance 100000", -17, 100_000.0), ("--white-luminance 100 --white d50", -7, 100.0)]
+    {
+        bench.run(&format!("to-xyz xyz.exr {option} --viewable -o t.exr"), &[]);
+        assert_eq!(white("t.exr").map(|white| white[1]), Some(luminance));
+        assert_eq!(bench.sidecar("t.exr").sample_scale, Some(2.0_f64.powi(scale)));
+        assert_eq!(bench.frame("t.exr").samples, bench.frame("xyz.exr").samples);
+    }
+    let said = bench.said("to-xyz xyz.exr --white d50 -o t.exr", 1);
+    assert!(said.contains("nothing tells how bright white is in it; give --white-luminance"), "{said}");
+    let said = bench.said("to-xyz xyz.exr --white 1,0,1 -o t.exr", 2);
+    assert!(said.contains("is impossible; all three must be above 0"), "{said}");
 }

@@ -82,6 +82,29 @@ pub fn in_digits(value: f64, significant: u8) -> String {
     }
 }
 
+/// A share of 1 in per cent, to so many significant digits, or to as many more as it takes that not nearly all reads as all: 99.96.
+pub fn percent(share: f64, significant: u8) -> String {
+    unlike_all(share, in_digits(100.0 * share, significant))
+}
+
+/// The same with so many decimals, or with two digits where it would read as none.
+pub fn percent_in_decimals(share: f64, decimals: usize) -> String {
+    let shown = format!("{:.decimals$}", 100.0 * share);
+    let reads_none = share > 0.0 && shown.parse() == Ok(0.0);
+    if reads_none { in_digits(100.0 * share, 2) } else { unlike_all(share, shown) }
+}
+
+/// What is `shown` of a share, but for one of less than 1 that would read as 100: that to the first digit of what it lacks.
+fn unlike_all(share: f64, shown: String) -> String {
+    let lacking = 1.0 - share;
+    if !(lacking > 0.0 && shown.parse() == Ok(100.0)) {
+        return shown;
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 14 digits")]
+    let digits = (-2.0 - lacking.log10().floor()).max(1.0) as usize;
+    format!("{:.digits$}", 100.0 * share)
+}
+
 /// A number rounded to so many significant digits: 40000 of 39 871 in one or two.
 pub fn about(value: f64, significant: u8) -> String {
     if value == 0.0 || !value.is_finite() {
@@ -144,6 +167,15 @@ fn shortened(text: &str, (first, last): (usize, usize)) -> Cow<'_, str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_not_all_or_none_does_not_read_so() {
+        let shares = [0.0, 1e-9, 0.0012, 0.4, 0.99, 0.995, 76_773.0 / 76_800.0, 1.0 - 1.2e-7, 1.0];
+        let wanted = ["0", "1.0e-7", "0.12", "40", "99", "99.5", "99.96", "99.99999", "100"];
+        assert_eq!(shares.map(|share| percent(share, 2)), wanted);
+        let wanted = ["0.0", "1.0e-7", "0.1", "40.0", "99.0", "99.5", "99.96", "99.99999", "100.0"];
+        assert_eq!(shares.map(|share| percent_in_decimals(share, 1)), wanted);
+    }
 
     #[test]
     fn nothing_steers_a_terminal() {

@@ -4,6 +4,7 @@
 
 use super::advice::output_hint;
 use crate::formats::foreign::number_complaint;
+use crate::formats::keys;
 use crate::names::nearest;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -12,8 +13,40 @@ use std::path::Path;
 /// The word that begins as an argument with one dash does, where a file is called so.
 fn of_file<'a>(argument: &str, words: &'a [String]) -> Option<&'a str> {
     let is_one = |word: &&String| word.starts_with(argument) && !word.starts_with("--") && Path::new(word).is_file();
-    words.iter().find(is_one).map(String::as_str)
+    words.iter().find(is_one).filter(|_| argument.starts_with('-')).map(String::as_str)
 }
+
+/// What to say of a file too many, where it may be no output: the option that takes it where it is a file of ours, or how many the program
+/// takes.
+fn too_many(argument: &str, command: &Command, words: &[String]) -> Option<String> {
+    if argument.starts_with('-') || !Path::new(argument).is_file() {
+        return None;
+    }
+    let has = |option: &str| command.get_arguments().any(|one| one.get_long() == option.strip_prefix("--"));
+    let told = keys::kind_of_file(Path::new(argument)).and_then(|kind| kind.rsplit_once(", for "));
+    if let Some((kind, option)) = told.filter(|(_, option)| has(option)) {
+        return Some(format!("it is {kind}: give it as `{option} {argument}`"));
+    }
+    let ending = Path::new(argument).extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    if told.is_none() && ending.is_some_and(|ending| ["yaml", "yml"].contains(&ending.as_str())) {
+        let options: Vec<&str> = YAML_OPTIONS.into_iter().filter(|option| has(option)).collect();
+        if let [others @ .., last] = &options[..] {
+            let all = if others.is_empty() { (*last).to_owned() } else { format!("{} or {last}", others.join(", ")) };
+            return Some(format!("a YAML file is the value of {all}"));
+        }
+    }
+    if told.is_none() && output_hint(argument, command, words).is_some() {
+        return None;
+    }
+    match command.get_positionals().count() {
+        1 => Some("the program takes one input".into()),
+        2 => Some("the program takes two inputs".into()),
+        _ => None,
+    }
+}
+
+/// Options whose value is a YAML file.
+const YAML_OPTIONS: [&str; 3] = ["--matrix", "--sensor", "--metadata"];
 
 /// clap's complaint in one line about the arguments of `command`, which are these words.
 pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, words: &[String]) -> String {
@@ -29,6 +62,7 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
         ErrorKind::UnknownArgument => {
             let hint = in_words(meant(&argument, command, words).or_else(|| near_option(&argument, command)));
             let hint = output_hint(&argument, command, words).map_or(hint, |output| format!("; {output}"));
+            let hint = too_many(&argument, command, words).map_or(hint, |taken| format!("; {taken}"));
             let hint = in_quotes(&argument, command, words).map_or(hint, |quoted| format!("; write {quoted}"));
             let hint = of_file(&argument, words).map_or(hint, |file| format!("; for the file write `./{file}`"));
             let hint = if argument.strip_prefix("--") == Some("list") { LISTS_OF_DATA.to_owned() } else { hint };

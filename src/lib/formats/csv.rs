@@ -312,7 +312,7 @@ impl SpectralTable {
         }
         let like_uvspec = misread::LIKE_UVSPEC;
         if self.is_like_uvspec() && given.is_none() {
-            let problem = format!("{like_uvspec}, or give --radiance-unit where they are radiances");
+            let problem = format!("{like_uvspec}; --radiance-unit is for values that are radiances after all");
             return Err(Error::format(&self.name, problem));
         }
         let of_uvspec =
@@ -913,6 +913,12 @@ mod tests {
             assert!(refused("nm,photon_radiance\n400,1\n", given).contains("a unit of photons"));
             assert!(refused("nm,uavgdir\n400,1\n", given).contains("a mean over all directions"));
         }
+        let spoken_of = refused("# irradiance at ground, W/(m2 nm)\nnm,E\n400,1\n", None);
+        assert!(spoken_of.contains("its comments speak of `W/(m2 nm)`, an irradiance"), "{spoken_of}");
+        assert!(
+            spoken_of.contains("those of one direction") && spoken_of.ends_with("radiances after all"),
+            "{spoken_of}"
+        );
         for text in [
             "nm,irradiance (W m-2 sr-1 nm-1)\n400,1e-3\n",
             "nm,irradiance\nnm,W m-2 sr-1 nm-1\n400,1e-3\n",

@@ -240,9 +240,13 @@ fn native_tags(header: &FrameHeader) -> ExrTags {
         exposure_s: metadata.time_s().filter(|time_s| *time_s > 0.0),
         f_number: metadata.exposure.map(|e| e.f_number),
         iso_speed: metadata.iso_speed,
-        // Absolute XYZ: unscaled (1, 1, 1) has Y = 1 cd m⁻². Of relative ones no luminance is known.
-        white_luminance: (metadata.quantity == QuantityKind::Xyz && metadata.unit != RELATIVE_UNIT)
-            .then(|| metadata.sample_scale.unwrap_or(1.0).recip()),
+        // Absolute XYZ: unscaled (1, 1, 1) has Y = 1 cd m⁻²; linear sRGB that of its white. Of relative ones no luminance is known.
+        white_luminance: match metadata.quantity {
+            QuantityKind::Xyz => (metadata.unit != RELATIVE_UNIT).then_some(1.0),
+            QuantityKind::LinearSrgb => metadata.white_luminance(),
+            _ => None,
+        }
+        .map(|luminance| luminance / metadata.sample_scale.unwrap_or(1.0)),
         neutral_xy: match metadata.quantity {
             QuantityKind::Xyz => metadata.color.as_ref().and_then(|color| color.white).map(color::chromaticity),
             QuantityKind::LinearSrgb => Some(D65_XY),

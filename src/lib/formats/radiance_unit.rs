@@ -170,7 +170,18 @@ fn of_remarks(name: &str, remarks: &[Stated], given: Option<RadianceUnit>) -> Re
             let other = others().next().map(|(text, kind)| format!("`{text}`, {}", kind.in_words()));
             let spoken_of = other.unwrap_or_default();
             let problem = format!("it does not say the unit of its values, and its comments speak of {spoken_of}");
-            Err(Error::format(name, problem).give(&["radiance_unit"]))
+            let conversion = others().find_map(|(_, kind)| kind.conversion());
+            Err(match conversion {
+                None => Error::format(name, problem).give(&["radiance_unit"]),
+                Some(conversion) => {
+                    let wanted = RadianceUnit::USUAL[1];
+                    let problem = format!(
+                        "{problem}; spectral radiances are wanted, in units such as {wanted}: {conversion}; --radiance-unit is for \
+                         values that are radiances after all"
+                    );
+                    Error::format(name, problem)
+                }
+            })
         }
         (several, Some(given)) if several.contains(&given) => Ok((given, None)),
         (several, given) => {

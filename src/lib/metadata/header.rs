@@ -64,6 +64,11 @@ impl FrameHeader {
         }
     }
 
+    /// Whether it was simulated and no exposure drawn: its samples are what is expected. A clean frame of `add-noise` is a draw of nothing.
+    pub fn is_undrawn(&self) -> bool {
+        self.metadata.scene.is_some() && self.metadata.noise.is_none()
+    }
+
     /// The same without what tells it from other exposures of its scene: its name, its seed and number, how the camera was held, what
     /// its samples were counted to be, where charge spilled, and what this version does not know.
     #[must_use]

@@ -272,6 +272,12 @@ impl Metadata {
         is_named || self.color.as_ref().is_some_and(ColorRecord::is_relative)
     }
 
+    /// Luminance of the white that its colors refer to, in cd m⁻²; none where they are relative, or name none.
+    pub fn white_luminance(&self) -> Option<f64> {
+        let white = self.color.as_ref().and_then(|color| color.white).filter(|_| !self.is_relative());
+        white.map(|[_, luminance, _]| luminance).filter(|luminance| *luminance > 0.0 && luminance.is_finite())
+    }
+
     /// What its camera is called: by its sensor, and by its raw file.
     pub fn camera_names(&self) -> impl Iterator<Item = &str> {
         self.sensor.iter().map(|sensor| sensor.name.as_str()).chain(self.camera.as_deref())

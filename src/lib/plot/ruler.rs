@@ -96,7 +96,7 @@ impl Ruler {
                 values.iter().zip(labels).filter_map(tick).collect()
             }
             Scale::Log10 => self.log_ticks(count),
-            Scale::Reciprocal => self.reciprocal_ticks(count),
+            Scale::Reciprocal => self.reciprocal_ticks(count, None),
         }
     }
 
@@ -105,7 +105,10 @@ impl Ruler {
     pub fn ticks_between_ends(&self, count: f64, apart: f64) -> Vec<Tick> {
         let [from, to] = self.ends();
         let labels = end_labels(from, to, self.scale != Scale::Linear);
-        let mut ticks = self.ticks(count);
+        let mut ticks = match self.scale {
+            Scale::Reciprocal => self.reciprocal_ticks(count, Some(apart)),
+            Scale::Linear | Scale::Log10 => self.ticks(count),
+        };
         for (place, label) in [0.0, 1.0].into_iter().zip(labels) {
             // A round number at the end is written as those beside it.
             let same = ticks.iter().any(|tick| tick.label.is_some() && (tick.place - place).abs() < 1e-6);
@@ -155,8 +158,8 @@ impl Ruler {
         ticks
     }
 
-    /// Round numbers, the roundest first, each where it has room beside those before.
-    fn reciprocal_ticks(&self, count: f64) -> Vec<Tick> {
+    /// Round numbers, the roundest first, each where it has room beside those before, and so far from the ends.
+    fn reciprocal_ticks(&self, count: f64, from_ends: Option<f64>) -> Vec<Tick> {
         const DIGITS: [f64; 9] = [1.0, 2.0, 5.0, 3.0, 4.0, 1.5, 6.0, 8.0, 2.5];
         /// Numbers this much alike are as good as evenly spread.
         const NARROW: f64 = 1.5;
@@ -169,7 +172,9 @@ impl Ruler {
         let [lowest, highest] = [from, to].map(f64::log10);
         #[expect(clippy::cast_possible_truncation, reason = "logarithms within ±100")]
         let decades = (lowest - 1e-9).floor() as i32..=(highest + 1e-9).floor() as i32;
-        let apart = count.max(1.0).recip();
+        /// On a bar, times the height of a line.
+        const LINES: f64 = 1.4;
+        let apart = from_ends.map_or(f64::INFINITY, |least| LINES * least).min(count.max(1.0).recip());
         let mut ticks: Vec<Tick> = Vec::new();
         for digit in DIGITS {
             // Quotients by whole powers are the doubles next to what they stand for.
@@ -179,7 +184,10 @@ impl Ruler {
             };
             for value in decades.clone().map(of_decade) {
                 let Some(tick) = self.tick(value, Some(value.to_string())) else { continue };
-                if ticks.iter().all(|other| (other.place - tick.place).abs() >= apart) {
+                let to_end = tick.place.min(1.0 - tick.place);
+                // A round number at an end is that end.
+                let is_free = from_ends.is_none_or(|least| to_end >= least || to_end < 1e-6);
+                if is_free && ticks.iter().all(|other| (other.place - tick.place).abs() >= apart) {
                     ticks.push(tick);
                 }
             }
@@ -433,6 +441,19 @@ mod tests {
             assert_eq!(end_labels(low, high, false), wanted);
         }
         assert_eq!(end_labels(0.01, 12_345.6, true), ["0.01", "12346"]);
+    }
+
+    /// Of temperatures up to the farthest the upper end of the bar has numbers too: by inverses 20000 K lies at five sixths.
+    #[test]
+    fn numbers_cover_a_bar_of_inverses() {
+        let axis = Axis { scale: Scale::Reciprocal, ..Axis::linear("").range(3384.0, 998_619.0) };
+        let ruler = Ruler::new(&axis, std::iter::empty());
+        for (count, apart) in [(4.7, 0.106), (7.1, 0.071), (12.0, 0.035)] {
+            let ticks = ruler.ticks_between_ends(count, apart);
+            let places: Vec<f64> = ticks.iter().map(|tick| tick.place).collect();
+            assert!(places.windows(2).all(|pair| (apart..0.35).contains(&(pair[1] - pair[0]))), "{ticks:?}");
+            assert!(ticks.iter().any(|tick| tick.label.as_deref() == Some("20000")), "{ticks:?}");
+        }
     }
 
     #[test]

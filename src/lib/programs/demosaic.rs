@@ -69,7 +69,9 @@ fn demosaic(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     session.tell(requests::of_levels(stage.header()).as_slice());
     session.tell(requests::of_bent_codes(reader.header()).as_slice());
     if arguments.sigma {
-        session.drive(reader, &WithSigma::of_demosaicking(stage)?, output)
+        let stage = WithSigma::of_demosaicking(stage)?;
+        session.tell(requests::of_undrawn(reader.header()).as_slice());
+        session.drive(reader, &stage, output)
     } else {
         dim_green_below(stage.header()).into_iter().for_each(|level| stage.count_greens_below(level));
         session.drive(reader, &stage, output)

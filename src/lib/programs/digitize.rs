@@ -51,6 +51,7 @@ fn digitize(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     session.tell(&arguments.sensor.apply(&mut reader)?);
     let settings = AdcSettings { bits: arguments.bits, bias_adu: arguments.bias, adu_per_e: arguments.slope };
     let mut stage = Digitize::new(reader.header(), &settings)?;
+    session.tell(requests::of_expected(reader.header()).as_slice());
     propagation::note(stage.header_mut(), Equations::Exact);
     session.sign(stage.header_mut());
     session.tell(requests::of_levels(stage.header()).as_slice());

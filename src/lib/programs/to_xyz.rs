@@ -5,7 +5,7 @@ use crate::cli;
 use crate::error::Result;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::register::{announce, check_inputs};
-use crate::requests::{Conversion, options};
+use crate::requests::{self, Conversion, options};
 use crate::sigma::WithSigma;
 use crate::stream::RowSource;
 use clap::Parser;
@@ -69,6 +69,7 @@ fn convert(
     session.sign(stage.header_mut());
     if *sigma {
         let stage = WithSigma::of_conversion(stage, reader.header())?;
+        session.tell(requests::of_undrawn(reader.header()).as_slice());
         session.drive(reader, &stage, output)
     } else {
         session.drive(reader, &stage, output)

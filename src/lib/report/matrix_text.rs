@@ -3,6 +3,7 @@
 use super::table;
 use crate::analysis::characterization::CameraMatrix;
 use crate::color::difference::DifferenceReport;
+use crate::text::percent_in_decimals;
 use std::fmt::Write;
 
 /// A matrix with what its file says of how well it is known.
@@ -60,7 +61,7 @@ pub(super) fn differences_text(rows: &[(String, DifferenceReport)], out: &mut St
             }
             let shares = [found.below_tenth, found.below_quarter, found.below_half];
             for (column, share) in columns[6..].iter_mut().zip(shares) {
-                column.push(format!("{:.1} %", 100.0 * share));
+                column.push(format!("{} %", percent_in_decimals(share, 1)));
             }
         }
     }

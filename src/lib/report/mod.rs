@@ -120,9 +120,10 @@ pub fn check_yaml_name(output: Option<&Path>, what: &str) -> Result<()> {
 const LINES: [&str; 2] = ["jsonl", "ndjson"];
 
 /// What names of files end in that no report should be written to.
-const OF_OTHERS: [&str; 21] = [
-    "json", "yaml", "yml", "csv", "tsv", "xls", "xlsx", "ods", "parquet", "html", "md", "tex", "pdf", "svg", "png",
-    "jpg", "jpeg", "exr", "tif", "tiff", "dng",
+const OF_OTHERS: [&str; 46] = [
+    "json", "yaml", "yml", "csv", "tsv", "xls", "xlsx", "xlsm", "ods", "numbers", "parquet", "html", "htm", "xml",
+    "md", "rst", "tex", "doc", "docx", "odt", "rtf", "pages", "ppt", "pptx", "odp", "epub", "pdf", "ps", "eps", "svg",
+    "png", "jpg", "jpeg", "gif", "bmp", "webp", "exr", "tif", "tiff", "dng", "fits", "fit", "npy", "npz", "h5", "mat",
 ];
 
 fn unwritable(error: impl std::fmt::Display) -> Error {

@@ -18,6 +18,7 @@ use crate::stages::masters::Averaging;
 use crate::stages::saturation::{SATURATED, bits, with_mask};
 use crate::stages::sites::SiteClasses;
 use crate::stream::{RowSink, RowSource};
+use crate::text::percent_in_decimals;
 use crate::units::QuantityKind;
 use clap::Args;
 use rayon::prelude::*;
@@ -144,9 +145,9 @@ impl Samples {
 /// A warning of exposures whose light differs, of which there is no median.
 fn doubt_of_levels(first: &str, name: &str, Unlike { share, spread }: Unlike) -> String {
     format!(
-        "{first}: in {:.0} % of it the light of the exposures differs, by {spread:.1} times the noise of one; there their {name} is the exposure in \
+        "{first}: in {} % of it the light of the exposures differs, by {spread:.1} times the noise of one; there their {name} is the exposure in \
          the middle, with the noise of one, and nothing is predicted of it; --combine mean takes all, and correct-frame brings flats to one level",
-        100.0 * share
+        percent_in_decimals(share, 0)
     )
 }
 

@@ -7,6 +7,7 @@ use crate::camera::levels::{BlackLevel, near_black};
 use crate::error::Result;
 use crate::metadata::FrameHeader;
 use crate::numerics::cut_off::AtZero;
+use crate::text::percent_in_decimals;
 
 /// The level of a border.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,10 +63,10 @@ impl MeasuredLevel {
         const LEAST_ADU: f64 = 0.02;
         let excess = self.low.excess(1.0).filter(|excess| self.low.share() > LEAST_SHARE && *excess > LEAST_ADU)?;
         Some(format!(
-            "{}: {:.0} % of its masked photosites (`masked_areas`) read 0, where codes are cut off; as far as they are normal their mean is {excess:.2} \
+            "{}: {} % of its masked photosites (`masked_areas`) read 0, where codes are cut off; as far as they are normal their mean is {excess:.2} \
              ADU too high, and the frame too low by as much behind it; have the camera add an offset, or give its bias, --black",
             frame.name,
-            100.0 * self.low.share()
+            percent_in_decimals(self.low.share(), 0)
         ))
     }
 

@@ -112,7 +112,7 @@ impl ColorPair {
     ///
     /// # Errors
     ///
-    /// Those of readers, and of [`Comparison::new`].
+    /// Those of readers, and of [`Comparison::new`]; [`Error::Usage`] for XYZ below 0.
     pub fn open(&self) -> Result<(Comparison<FrameReader>, Vec<Note>)> {
         check_inputs([&self.a, &self.b].into_iter().filter_map(FrameOrColor::path).map(Some))?;
         let Self { space, white, white_luminance, part, crop, .. } = *self;
@@ -120,6 +120,16 @@ impl ColorPair {
         if (crop.is_some() || part > 0) && ![&self.a, &self.b].into_iter().any(is_frame) {
             let option: &[_] = if crop.is_some() { &["crop"] } else { &["part"] };
             return Err(Error::Usage("both are colors, of which there are no parts".into()).leave_out(option));
+        }
+        let is_negative =
+            |side: &&FrameOrColor| matches!(side, FrameOrColor::Color(color) if color.iter().any(|x| *x < 0.0));
+        if let Some(FrameOrColor::Color([x, y, z])) = [&self.a, &self.b].into_iter().find(is_negative)
+            && space != Some(Space::Lab)
+        {
+            let problem = format!(
+                "{x},{y},{z} is no color in XYZ: X, Y and Z are not negative; L,a,b are given with --space lab"
+            );
+            return Err(Error::Usage(problem));
         }
         let settings = ComparisonSettings { space, white, white_luminance };
         let comparison = Comparison::new(self.a.open(part, crop)?, self.b.open(part, crop)?, &settings)?;
@@ -174,6 +184,20 @@ mod tests {
         for wrong in ["1,2", "1,2,3,4", "1,2,x", "inf,1,2", "--spac", "-x"] {
             assert_eq!(read(wrong), None, "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_negative_number_makes_no_xyz() {
+        let said = |space| {
+            let (a, b) = (FrameOrColor::Color([50.0, 2.67, -79.8]), FrameOrColor::Color([50.0, 0.0, 0.0]));
+            let pair = ColorPair { a, b, space, white: None, white_luminance: None, part: 0, crop: None };
+            pair.open().map_err(|error| error.to_string()).err()
+        };
+        let wanted = "50,2.67,-79.8 is no color in XYZ: X, Y and Z are not negative; L,a,b are given with --space lab";
+        for space in [None, Some(Space::Xyz)] {
+            assert_eq!(said(space).as_deref(), Some(wanted));
+        }
+        assert_eq!(said(Some(Space::Lab)), None);
     }
 
     #[test]

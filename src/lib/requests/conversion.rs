@@ -33,7 +33,7 @@ pub(super) const OF_SENSOR: &str = "sensor";
 /// Which colors are made of a frame, and by which matrix.
 #[derive(Debug, Clone, Args)]
 #[command(mut_arg("white", |option| option.help(
-    "White of lab, luv, srgb and linear-srgb: d65, d50, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative"
+    "White of lab, luv, srgb and linear-srgb, of XYZ that are there already recorded with any space: d65, d50, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative"
 )))]
 #[command(mut_arg("white_luminance", |option| option.help(
     "Luminance of the white d65, d50 or e in cd/m2; by default that at which the camera saturates, or of XYZ what they record. Of relative XYZ it is 1"

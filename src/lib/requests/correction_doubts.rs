@@ -5,6 +5,7 @@ use crate::stages::darks::CutOff;
 use crate::stages::defects::lost_beyond;
 use crate::stages::flats::{FlatFrames, FlatLevels, FlatMeans};
 use crate::stream::RowSource;
+use crate::text::percent_in_decimals;
 
 /// The share of a variance that limits may take unsaid.
 const LEAST_LOST: f64 = 1e-3;
@@ -69,10 +70,10 @@ pub(super) fn doubt_of_cut_off(cut: &CutOff, left_adu: f64) -> Option<String> {
     let CutOff { name, share, excess_adu } = cut;
     (*excess_adu > LEAST_ADU.max(LEAST_SHARE * left_adu)).then(|| {
         format!(
-            "{name}: {:.0} % of the samples of these dark or bias frames are 0, where codes are cut off; as far as they are normal their mean is \
+            "{name}: {} % of the samples of these dark or bias frames are 0, where codes are cut off; as far as they are normal their mean is \
              {excess_adu:.2} ADU too high, and what they come off, {left_adu:.2} ADU on average, is too low by as much; have the camera add an offset, \
              or take off its bias, --black",
-            100.0 * share
+            percent_in_decimals(*share, 0)
         )
     })
 }
@@ -89,9 +90,9 @@ pub(super) fn said_of_levels<S: RowSource>(flats: &FlatFrames<S>) -> Option<Stri
 fn doubt_of_unlike(name: &str, levels: &FlatLevels) -> Option<String> {
     let unlike = levels.unlike?;
     Some(format!(
-        "{name}: in {:.0} % of the flats their light differs, each brought to one level, by {:.1} times the noise of one; there the median or \
+        "{name}: in {} % of the flats their light differs, each brought to one level, by {:.1} times the noise of one; there the median or \
          clipped mean takes the flat in the middle, with the noise of one, and nothing is predicted of the frame; --combine mean takes all",
-        100.0 * unlike.share,
+        percent_in_decimals(unlike.share, 0),
         unlike.spread
     ))
 }

@@ -9,6 +9,7 @@ use crate::stages::bounds::{Bounds, most_off_bias};
 use crate::stages::darks::{DRIFT, DarkFrames, DarkStack, Misfit};
 use crate::stages::flats::FlatFrames;
 use crate::stream::RowSource;
+use crate::text::percent_in_decimals;
 
 /// What a frame and its sensor tell of the mean of its dark frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,8 +87,8 @@ impl DarkLevels {
         let name = flats.name();
         let of_share = |share: f64| {
             format!(
-                "{name}: in {:.0} % of it its mean is below that of what came off; are these dark or bias frames of it?",
-                100.0 * share
+                "{name}: in {} % of it its mean is below that of what came off; are these dark or bias frames of it?",
+                percent_in_decimals(share, 0)
             )
         };
         let below = flats.below_darks().map(of_share);
@@ -347,23 +348,23 @@ fn doubt_of_low(name: &str, dark: f64, least: f64) -> Option<String> {
 /// A warning of dark frames with samples below zero.
 fn doubt_of_negatives((name, share): (&str, f64)) -> String {
     format!(
-        "{name}: {:.0} % of its samples are below zero, as no camera writes them; was a bias taken off? What it lacks stays in the frame",
-        100.0 * share
+        "{name}: {} % of its samples are below zero, as no camera writes them; was a bias taken off? What it lacks stays in the frame",
+        percent_in_decimals(share, 0)
     )
 }
 
 /// A warning of dark frames that are cut off at zero, beside a frame that is far above it.
 fn doubt_of_zeros((name, share): (&str, f64)) -> String {
     format!(
-        "{name}: {:.0} % of its samples are exactly 0, and nothing of what it comes off is near it; was a bias taken off, and what fell below \
+        "{name}: {} % of its samples are exactly 0, and nothing of what it comes off is near it; was a bias taken off, and what fell below \
          zero cut off? What it lacks stays in the frame",
-        100.0 * share
+        percent_in_decimals(share, 0)
     )
 }
 
 /// A warning of what came off a frame and cannot well be dark frames of it, by the samples of both.
 fn doubt_of_misfit(name: &str, misfit: Misfit) -> String {
-    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let percent = |share: f64| format!("{} %", percent_in_decimals(share, 0));
     match misfit {
         Misfit::Below(share) => format!(
             "{name}: in {} of it its mean is below that of what came off; are these dark or bias frames of it, and of the scale of its codes?",

@@ -2,9 +2,10 @@
 
 use crate::analysis::statistics::{ChannelReport, RegionReport, RepeatedReport, Report};
 use crate::formats::input::FrameReader;
-use crate::metadata::{AdcRecord, FrameHeader, Metadata};
+use crate::metadata::{AdcRecord, FrameHeader, HistoryEntry, Metadata};
 use crate::stream::RowSource;
 use crate::text::{counted, in_decimals, in_digits};
+use crate::units::QuantityKind;
 
 /// Something that came up; whoever asked decides what to do with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -138,6 +139,21 @@ pub fn of_levels(frame: &FrameHeader) -> Option<Note> {
         return None;
     };
     Some(Note::Warning(format!("{}: {problem}", frame.name)))
+}
+
+/// A warning of expected electrons that are made codes; of several files it is said once.
+pub fn of_expected(input: &FrameHeader) -> Option<Note> {
+    let text = "no noise was drawn: these are codes of what is expected; `add-noise` comes before";
+    let is_expected = input.metadata.quantity == QuantityKind::ExpectedElectrons;
+    is_expected.then(|| Note::Warning(text.into()))
+}
+
+/// A warning of standard deviations beside pixels that have no noise; not where a program before gave it.
+pub fn of_undrawn(input: &FrameHeader) -> Option<Note> {
+    let has_sigma = |entry: &HistoryEntry| entry.arguments.iter().any(|argument| argument == "--sigma");
+    let is_told = input.metadata.history.iter().any(has_sigma);
+    let text = "no noise was drawn; the standard deviations are those of noisy frames of the same scene";
+    (input.is_undrawn() && !is_told).then(|| Note::Warning(text.into()))
 }
 
 /// A warning of codes that are not proportional to charge, of which colors are made all the same.

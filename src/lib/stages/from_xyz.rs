@@ -109,7 +109,8 @@ impl FromXyz {
         }
         let space = settings.space;
         let white = reference_white(input, settings)?;
-        check_white(space, white)?;
+        // What is recorded must be a white, whatever the space.
+        check_white(if settings.names_white() { Space::Lab } else { space }, white)?;
         let has_covariance = input.geometry.channels[3..].iter().eq(COVARIANCE_LAYER.iter()) && space != Space::Srgb;
         let adaptation = settings.adapting.map_or(Ok(Matrix3::identity()), |adapting| adapting.matrix())?;
 
@@ -124,9 +125,10 @@ impl FromXyz {
             geometry.channels.extend(layers_of(space)?.into_iter().map(str::to_owned));
             metadata.uncertainty = input.metadata.uncertainty.clone().or_else(|| Some(Coverage::noise_only(None)));
         }
-        if needs_white(space) || settings.adapting.is_some() {
+        let is_recorded = needs_white(space) || settings.names_white();
+        if is_recorded || settings.adapting.is_some() {
             let record = metadata.color.get_or_insert_with(ColorRecord::of_xyz);
-            if needs_white(space) {
+            if is_recorded {
                 record.white = Some(white);
             }
             if let Some(adapting) = settings.adapting {
@@ -175,6 +177,13 @@ impl FromXyz {
     }
 }
 
+impl XyzSettings {
+    /// Whether a white is asked for, be it for spaces whose numbers do not hang on it: it is recorded, and `--viewable` scales by it.
+    fn names_white(&self) -> bool {
+        self.white != White::D65 || self.white_luminance.is_some()
+    }
+}
+
 /// XYZ of the white that colors refer to.
 fn reference_white(input: &FrameHeader, settings: &XyzSettings) -> Result<[f64; 3]> {
     let metadata = &input.metadata;
@@ -191,7 +200,7 @@ fn reference_white(input: &FrameHeader, settings: &XyzSettings) -> Result<[f64; 
     match (settings.white, luminance) {
         (White::Absolute(white), _) => Ok(white),
         (white, Some(luminance)) => Ok(white.xyz(luminance)),
-        (white, None) if !needs_white(settings.space) => Ok(white.xyz(1.0)),
+        (white, None) if !needs_white(settings.space) && !settings.names_white() => Ok(white.xyz(1.0)),
         _ => {
             let problem = "nothing tells how bright white is in it";
             Err(input.refuse(problem).give(&["white_luminance"]))

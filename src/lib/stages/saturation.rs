@@ -12,7 +12,7 @@ use crate::metadata::{AdcRecord, CorrectionRecord, FrameHeader};
 use crate::random::Source;
 use crate::stages::transfer::uniform_share;
 use crate::stream::{Counts, Footprint, RowSink, RowSource, Stage};
-use crate::text::in_digits;
+use crate::text::{percent, percent_in_decimals};
 use crate::units::QuantityKind;
 
 /// The channel that marks pixels.
@@ -247,8 +247,7 @@ pub fn untold(frame: &FrameHeader, is_marked: bool) -> Option<String> {
     }
     let pixels = frame.geometry.width as f64 * frame.geometry.height as f64;
     let share = frame.metadata.saturated_share.filter(|share| share * pixels >= LEAST_PIXELS)?;
-    let percent = 100.0 * share;
-    let percent = if percent >= 0.1 { format!("{percent:.1}") } else { in_digits(percent, 2) };
+    let percent = if share >= 1e-3 { percent_in_decimals(share, 1) } else { percent(share, 2) };
     Some(format!("{percent} % of its pixels are made of saturated samples, by the law of its scene"))
 }
 

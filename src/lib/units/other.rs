@@ -109,7 +109,7 @@ impl OtherUnit {
     pub fn conversion(self) -> Option<&'static str> {
         Some(match self {
             Self::Irradiance => {
-                "take those of one direction from where these come from; of a matt white surface they are the irradiance over pi"
+                "take those of one direction from where these come from, as `uu` of uvspec; of a matt white surface they are the irradiance over pi"
             }
             Self::Mean | Self::Power => "take those of one direction from where these come from",
             Self::Intensity => "divide each value by the area that shines, as it is seen from there",

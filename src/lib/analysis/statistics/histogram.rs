@@ -90,6 +90,46 @@ impl Histogram {
         Self { width: self.width * times as f64, shift: self.shift / times as f64, counts, ends: self.ends }
     }
 
+    /// The same of samples that are all whole numbers, each in the middle of a bin or of its part of one.
+    #[must_use]
+    pub fn of_whole(&self) -> Self {
+        if self.shift != 0.0 || self.width <= 0.0 {
+            return self.clone();
+        }
+        if self.width >= 1.0 {
+            return Self { shift: -0.5 / self.width, ..self.clone() };
+        }
+        let mut counts = BTreeMap::new();
+        for (bin, count) in &self.counts {
+            #[expect(clippy::cast_possible_truncation, reason = "a bin that is no farther than doubles count")]
+            let whole = (*bin as f64 * self.width).round() as i64;
+            *counts.entry(whole).or_default() += count;
+        }
+        Self { width: 1.0, shift: -0.5, counts, ends: self.ends }
+    }
+
+    /// The same with bins about so many times as wide that begin with the lowest sample, so that the highest is near the end of the last.
+    #[must_use]
+    pub fn merged_within(&self, times: i64) -> Self {
+        /// How far the width may be from that which is asked for.
+        const LEAST: f64 = 0.7;
+        const MOST: f64 = 1.4;
+        let [Some(first), Some(last)] = [self.counts.keys().next(), self.counts.keys().next_back()] else {
+            return self.clone();
+        };
+        let bins = last - first + 1;
+        #[expect(clippy::cast_possible_truncation, reason = "a few bins; casts saturate")]
+        let [least, most] = [(LEAST * times as f64).ceil() as i64, (MOST * times as f64).floor() as i64];
+        let beyond = |times: &i64| (bins.div_euclid(*times) + i64::from(bins % times > 0)) * times - bins;
+        let times = (least.max(1)..=most.max(1)).min_by_key(|one| (beyond(one), (one - times).abs())).unwrap_or(1);
+        let mut counts = BTreeMap::new();
+        for (bin, count) in &self.counts {
+            *counts.entry((bin - first).div_euclid(times)).or_default() += count;
+        }
+        let shift = (*first as f64 + self.shift) / times as f64;
+        Self { width: self.width * times as f64, shift, counts, ends: self.ends }
+    }
+
     /// Where a bin begins.
     pub fn begin(&self, bin: i64) -> f64 {
         (bin as f64 + self.shift) * self.width
@@ -129,6 +169,30 @@ mod tests {
     }
 
     /// The middle of 0, 1 … 999, less 5 at each end, with a far sample or without; of few samples all.
+    /// Every code of eight bits once makes the same count in all bins, from first to last, whatever their number; so do its multiples.
+    #[test]
+    fn whole_numbers_fill_bins_evenly() {
+        for (is_codes, step) in [(true, 1.0), (false, 1.0), (false, 64.0)] {
+            let mut ramp = Histogram::new(is_codes);
+            ramp.add((0..256).map(|code| step * f64::from(code)));
+            let ramp = ramp.of_whole();
+            for times in [1, 3, 7, 9, 10, 26] {
+                let merged = ramp.merged_within(times * if step > 1.0 { 16 } else { 1 });
+                let density = |bin: &i64, count: &u64| {
+                    let end = merged.begin(bin + 1).min(merged.ends[1] + 0.5 * step);
+                    *count as f64 / (end - merged.begin(*bin))
+                };
+                let seen: Vec<f64> = merged.counts.iter().map(|(bin, count)| density(bin, count)).collect();
+                assert!(
+                    seen.iter().all(|one| (one * step - 1.0).abs() < 1e-9 || step > 1.0),
+                    "{is_codes} {times}: {seen:?}"
+                );
+                assert!(merged.begin(0) <= 0.0 && merged.width.fract() == 0.0, "{times}: {}", merged.width);
+                assert_eq!(merged.total(), 256);
+            }
+        }
+    }
+
     #[test]
     fn the_middle_leaves_out_what_is_far_and_bins_stay_fine() {
         let mut samples: Vec<f64> = (0..1000).map(f64::from).collect();

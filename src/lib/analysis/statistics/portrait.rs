@@ -36,8 +36,10 @@ pub struct Portrait {
     pub groups: Vec<Likeness>,
     /// Pixels of the first three channels, evenly spread.
     pub pixels: Vec<[f64; 3]>,
-    /// Whether all samples are whole numbers.
+    /// Whether all samples are codes, whole numbers that were rounded.
     pub is_whole: bool,
+    /// Whether all samples are whole numbers, whatever they are.
+    pub has_whole: bool,
     frame: FrameHeader,
     /// Columns and rows after which classes repeat themselves.
     period: [usize; 2],
@@ -184,6 +186,7 @@ impl Portrait {
             groups,
             pixels: Vec::new(),
             is_whole: is_codes,
+            has_whole: true,
             frame: frame.clone(),
             period,
             classes,
@@ -222,7 +225,8 @@ impl Portrait {
                 if is_inverse {
                     samples.iter_mut().for_each(|kelvin| *kelvin = 1e6 / *kelvin);
                 }
-                self.is_whole &= samples.iter().all(|sample| !sample.is_finite() || sample.fract() == 0.0);
+                self.has_whole &= samples.iter().all(|sample| !sample.is_finite() || sample.fract() == 0.0);
+                self.is_whole &= self.has_whole;
                 let deviations = self.groups[group].take(&samples, y, offset, self.period[0]);
                 lines.push(Line { group, deviations });
             }

@@ -7,6 +7,7 @@ use crate::analysis::characterization::MATRIX_SCHEMA;
 use crate::camera::sensor::SENSOR_SCHEMA;
 use crate::metadata::{METADATA_SCHEMA, METADATA_TEMPLATE};
 use crate::names::Named;
+use std::path::Path;
 
 /// A kind of file whose keys are described.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -129,6 +130,13 @@ pub fn kind_of(text: &str) -> Option<&'static str> {
     let schema = text.lines().find_map(|line| line.strip_prefix("schema:"))?;
     let schema = schema.trim().trim_matches(['"', '\'']);
     KINDS.iter().find(|(_, begin, ..)| schema.starts_with(begin)).map(|(_, _, kind, _)| *kind)
+}
+
+/// The same of a file, where it is small enough to be one.
+pub fn kind_of_file(path: &Path) -> Option<&'static str> {
+    const MOST_BYTES: u64 = 1 << 20;
+    let is_small = std::fs::metadata(path).is_ok_and(|about| about.is_file() && about.len() <= MOST_BYTES);
+    kind_of(&std::fs::read_to_string(path).ok().filter(|_| is_small)?)
 }
 
 /// All keys of all files.

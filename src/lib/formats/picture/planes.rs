@@ -81,6 +81,16 @@ impl Choice {
         matches!(frame.metadata.quantity, QuantityKind::ColorDifference | QuantityKind::Cct)
     }
 
+    /// Whether no number of what is shown can be below 0: a difference of colors, a standard deviation, light as it is expected.
+    pub fn is_never_negative(&self, frame: &FrameHeader) -> bool {
+        let is_spread = |name: &str| name.starts_with("sigma.") || name.starts_with("variance.");
+        let is_light = matches!(
+            frame.metadata.quantity,
+            QuantityKind::ColorDifference | QuantityKind::SpectralRadiance | QuantityKind::ExpectedElectrons
+        );
+        is_light || self.channels.iter().all(|place| is_spread(&frame.geometry.channels[*place]))
+    }
+
     /// What reports call the channels that are shown.
     pub fn names(&self, frame: &FrameHeader) -> Vec<String> {
         match &self.called {
@@ -328,6 +338,18 @@ mod tests {
         assert_eq!(find(&plane, "Y").unwrap(), (0, None));
         let complaint = find(&plane, "C").unwrap_err().to_string();
         assert_eq!(complaint, "f: there is no plane `C`; it has Y, R, G, B");
+    }
+
+    #[test]
+    fn what_cannot_be_below_zero_is_known() {
+        let is_so = |quantity, channels: &[&str], name| {
+            let frame = frame(quantity, channels);
+            Choice::of(&frame, Some(name), true).unwrap().is_never_negative(&frame)
+        };
+        assert!(is_so(QuantityKind::ColorDifference, &MAP_CHANNELS, "jnd"));
+        let xyz = ["R", "G", "B", "covariance.XY", "sigma.R"];
+        assert!(is_so(QuantityKind::Xyz, &xyz, "sigma.R"));
+        assert!(!is_so(QuantityKind::Xyz, &xyz, "covariance.XY") && !is_so(QuantityKind::Xyz, &xyz, "X"));
     }
 
     #[test]

@@ -382,7 +382,8 @@ pub(super) fn beyond(reduced: &Reduced, (low, high): (f64, f64), range: Range) -
     is_beyond.then(|| format!("{ends}lowest {least}, highest {most}"))
 }
 
-/// The ends of the numbers of a single plane; of one that is the same everywhere, half of it to both sides.
+/// The ends of the numbers of a single plane; of one that is the same everywhere, half of it to both sides, and from 0 to 1 where it is 0
+/// of what is never less.
 ///
 /// # Errors
 ///
@@ -392,7 +393,8 @@ pub(super) fn one_range(frame: &FrameHeader, range: Range, choice: &Choice, redu
         && low == high
     {
         let room = if low == 0.0 { 1.0 } else { 0.5 * low.abs() };
-        return Ok((low - room, low + room));
+        let least = if low == 0.0 && choice.is_never_negative(frame) { 0.0 } else { low - room };
+        return Ok((least, low + room));
     }
     match Shade::new(frame, range, choice, reduced)? {
         Shade::Planes(ranges) => Ok(ranges[0]),

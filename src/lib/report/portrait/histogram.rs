@@ -5,7 +5,7 @@ use crate::analysis::statistics::histogram::Histogram;
 use crate::analysis::statistics::portrait::{Foreseen, Likeness, Portrait};
 use crate::numerics::normal::cumulative;
 use crate::plot::{Axis, Color, Marks, Panel};
-use crate::text::in_digits;
+use crate::text::{in_digits, percent};
 
 /// The middle of a histogram leaves out this share of the samples at each end; what is shown reaches this part of its width
 /// beyond: of a normal law 2.6 and 5.2 standard deviations.
@@ -20,7 +20,8 @@ pub(super) fn histogram(portrait: &Portrait, scale: &Scale) -> Panel {
     let density = if scale.unit.is_empty() { "density".to_owned() } else { format!("share per {}", scale.unit) };
     let x = Axis::linear(&scale.with_unit(words_of_reference(portrait)));
     let mut panel = Panel::new(x, Axis::linear(&density));
-    let groups: Vec<Bins> = scale.groups(portrait).filter_map(|(color, group)| Bins::of(color, group)).collect();
+    let groups: Vec<Bins> =
+        scale.groups(portrait).filter_map(|(color, group)| Bins::of(color, group, portrait.has_whole)).collect();
     // One window for all: what it shows of a class is not beyond it.
     let window = groups.iter().map(Bins::window).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map(|[low, high]| {
         let room = ROOM * (high - low);
@@ -91,37 +92,47 @@ struct Bins<'a> {
     group: &'a Likeness,
     reference: f64,
     bins: Histogram,
+    /// From where to where bins reach: of whole numbers half of one beyond the lowest and the highest.
+    reach: [f64; 2],
     /// The first and the last bin of its middle and some more.
     own: [i64; 2],
 }
 
 impl<'a> Bins<'a> {
-    fn of(color: Color, group: &'a Likeness) -> Option<Self> {
+    fn of(color: Color, group: &'a Likeness, has_whole: bool) -> Option<Self> {
         let reference = reference(group)?;
-        let [from, to] = group.histogram.middle(LEFT_OUT)?;
+        let finest = if has_whole { &group.histogram.of_whole() } else { &group.histogram };
+        let [from, to] = finest.middle(LEFT_OUT)?;
         #[expect(clippy::cast_possible_truncation, reason = "a few bins; casts saturate")]
-        let times = (((to - from) / BINS / group.histogram.width).round() as i64).max(1);
-        let bins = group.histogram.merged(times);
+        let times = (((to - from) / BINS / finest.width).round() as i64).max(1);
+        let bins = if has_whole { finest.merged_within(times) } else { finest.merged(times) };
+        let [lowest, highest] = finest.ends;
+        let reach = if has_whole { [lowest - 0.5, highest + 0.5] } else { [f64::NEG_INFINITY, f64::INFINITY] };
         let room = BEYOND * (to - from) + bins.width;
         let is_own = |bin: &&i64| (from - room..to + room).contains(&bins.begin(**bin));
         let (first, last) = (bins.counts.keys().find(is_own)?, bins.counts.keys().rfind(is_own)?);
         let own = [*first, *last];
-        Some(Self { color, group, reference, own, bins })
+        Some(Self { color, group, reference, own, bins, reach })
     }
 
     /// Where a bin begins, from the mean.
     fn begin(&self, bin: i64) -> f64 {
-        self.bins.begin(bin) - self.reference
+        self.bins.begin(bin).max(self.reach[0]) - self.reference
+    }
+
+    /// Where it ends.
+    fn end(&self, bin: i64) -> f64 {
+        self.bins.begin(bin + 1).min(self.reach[1]) - self.reference
     }
 
     /// From where to where its own bins reach.
     fn window(&self) -> [f64; 2] {
-        [self.begin(self.own[0]), self.begin(self.own[1] + 1)]
+        [self.begin(self.own[0]), self.end(self.own[1])]
     }
 
     /// Whether the middle of a bin lies in a window.
     fn is_within(&self, bin: i64, [low, high]: [f64; 2]) -> bool {
-        (low..=high).contains(&(self.begin(bin) + 0.5 * self.bins.width))
+        (low..=high).contains(&(0.5 * (self.begin(bin) + self.end(bin))))
     }
 
     /// All its own bins, and the others in a window that hold samples, in their order.
@@ -137,7 +148,7 @@ impl<'a> Bins<'a> {
     /// The share of samples in a bin over its width.
     fn density(&self, bin: i64) -> f64 {
         let count = self.bins.counts.get(&bin).copied().unwrap_or(0);
-        count as f64 / self.bins.total() as f64 / self.bins.width
+        count as f64 / self.bins.total() as f64 / (self.end(bin) - self.begin(bin))
     }
 
     /// The line over the bins that are shown; between bins apart it is 0.
@@ -149,7 +160,7 @@ impl<'a> Bins<'a> {
                 steps.extend([[self.begin(before + 1), 0.0], [self.begin(bin), 0.0]]);
             }
             let density = self.density(bin);
-            steps.extend([[self.begin(bin), density], [self.begin(bin + 1), density]]);
+            steps.extend([[self.begin(bin), density], [self.end(bin), density]]);
             before = Some(bin);
         }
         steps
@@ -158,8 +169,9 @@ impl<'a> Bins<'a> {
     /// What is predicted of its own bins.
     fn law(&self, foreseen: &Foreseen, is_whole: bool) -> Vec<[f64; 2]> {
         let of = |bin: i64| {
-            let (from, to) = (self.bins.begin(bin), self.bins.begin(bin + 1));
-            [0.5 * (from + to) - self.reference, share_between(foreseen, is_whole, from, to) / self.bins.width]
+            let [from, to] = [self.begin(bin), self.end(bin)];
+            let share = share_between(foreseen, is_whole, from + self.reference, to + self.reference);
+            [0.5 * (from + to), share / (to - from)]
         };
         (self.own[0]..=self.own[1]).map(of).collect()
     }
@@ -202,7 +214,7 @@ impl Pile {
 
     fn words(self, name: &str) -> String {
         let end = if self.is_highest { "highest" } else { "lowest" };
-        format!("{} % of {name} in its {end} bin, beyond the axis", in_digits(100.0 * self.share, 2))
+        format!("{} % of {name} in its {end} bin, beyond the axis", percent(self.share, 2))
     }
 }
 

@@ -7,7 +7,7 @@ use crate::analysis::statistics::RegionReport;
 use crate::analysis::statistics::portrait::{Likeness, Portrait};
 use crate::color::xyy_about;
 use crate::plot::{Arrangement, Axis, Color, Marks, Panel, Plot, ReferenceLine};
-use crate::text::in_digits;
+use crate::text::percent;
 use crate::units::QuantityKind;
 use histogram::histogram;
 use nalgebra::{Matrix2, Matrix3};
@@ -18,6 +18,8 @@ use std::f64::consts::TAU;
 /// chromaticities are scatter without end.
 const FEW_LINES: f64 = 0.05;
 const FEW_PIXELS: f64 = 0.25;
+/// The axis of a profile reaches to so many steps of a sample, a 32-bit float, at least: less is their rounding.
+const FINEST_STEPS: f64 = 8.0;
 /// The share of a normal law of two variables within its ellipse.
 const WITHIN: f64 = 0.95;
 
@@ -60,7 +62,7 @@ fn left_out(portrait: &Portrait, region: &RegionReport) -> Option<String> {
     let parts: Vec<String> = [(region.not_finite, without), (saturated, "saturated"), (others, "marked")]
         .into_iter()
         .filter(|(count, _)| *count > 0)
-        .map(|(count, what)| format!("{} % {what}", in_digits(100.0 * count as f64 / all, 2)))
+        .map(|(count, what)| format!("{} % {what}", percent(count as f64 / all, 2)))
         .collect();
     (!parts.is_empty()).then(|| parts.join(", "))
 }
@@ -117,8 +119,10 @@ fn profile(portrait: &Portrait, scale: &Scale, axis: usize) -> Panel {
     // Columns and rows are those of the frame.
     let corner = [portrait.region.x, portrait.region.y][axis] as f64;
     let (mut bands, mut means) = (Vec::new(), Vec::new());
+    let mut finest = 0.0_f64;
     for (color, group) in scale.groups(portrait) {
         let Some(reference) = reference(group) else { continue };
+        finest = finest.max(f64::from(f32::EPSILON) * reference.abs());
         let points: Vec<[f64; 2]> =
             group.profiles[axis].points().map(|[at, mean]| [corner + at, deviation(mean, reference)]).collect();
         let [[first, _], .., [last, _]] = points[..] else { continue };
@@ -136,6 +140,10 @@ fn profile(portrait: &Portrait, scale: &Scale, axis: usize) -> Panel {
         let farthest = far.clone().fold(0.0, farther);
         panel.title = outside(far.count() as u64, means.len() as u64, &format!("means of {one}s"), farthest);
         panel.y = panel.y.range(low, high).widened(MARGIN);
+    }
+    let extremes = means.iter().copied().chain(bands.iter().map(|(_, std, _)| *std)).fold(0.0, farther).abs();
+    if extremes > 0.0 && extremes < FINEST_STEPS * finest {
+        panel.y = panel.y.range(-FINEST_STEPS * finest, FINEST_STEPS * finest);
     }
     if !bands.is_empty() {
         // For the legend: each class or channel has its own, in its color.

@@ -5,7 +5,7 @@ use crate::cfa::Class;
 use crate::chain::{ChainPrediction, ChainStage};
 use crate::metadata::AdcRecord;
 use crate::requests::notes::{Note, doubt_of_slope};
-use crate::text::in_digits;
+use crate::text::percent;
 
 /// The share of the samples of a class from which what is told of noise and color is that of cut-off samples.
 const TELLING: f64 = 0.01;
@@ -23,7 +23,7 @@ pub(super) fn of_cut(scene: &ChainPrediction) -> Option<Note> {
         .into_iter()
         .zip(shares(scene, ChainStage::Adu).into_iter().zip(full))
         .filter(|(_, (share, full))| *share >= TELLING && *full < 0.5)
-        .map(|(class, (share, _))| format!("{} % of {}", in_digits(100.0 * share, 3), class.letter()))
+        .map(|(class, (share, _))| format!("{} % of {}", percent(share, 3), class.letter()))
         .collect();
     (!cut.is_empty()).then(|| of_text(&format!("{} are saturated", cut.join(", "))))
 }

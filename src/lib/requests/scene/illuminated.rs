@@ -48,14 +48,15 @@ impl Scene {
         let xyz_from_rgb = xyz_from_rgb(&primaries, upsampler.white()).ok_or_else(|| {
             header.refuse("its primaries lie on a line, or their white is none; give others with --primaries")
         })?;
-        let told_luminance = reader.colors().white_luminance;
+        let told = told_white(&reader);
+        let told_luminance = told.map(|(luminance, _)| luminance);
         let white_luminance = self.picture.luminance.or(told_luminance).unwrap_or(WHITE_LUMINANCE);
         let (sampled_nm, white) = white_radiance(&light, &observer, white_luminance).ok_or_else(no_light)?;
         let light_name = format!("illuminant {illuminant}");
         let seen = sums.camera(&sampled_nm, &light_name, &mut found.notes)?;
         found.notes.extend(gap(&sampled_nm, &light_name));
         found.metadata.quadrature_error = seen.quadrature_error(&white);
-        self.tell(&header, illuminant, [self.picture.luminance, told_luminance], found);
+        self.tell(&header, illuminant, told, found);
         found.upsampling = Some(UpsamplingRecord {
             method: "jakob-hanika-2019".into(),
             encoding: encoding.to_string(),
@@ -91,9 +92,9 @@ impl Scene {
         let name = &header.name;
         let tags = match header.metadata.quantity {
             QuantityKind::Unspecified => reader.colors(),
-            QuantityKind::Srgb => ColorTags {
+            kind @ (QuantityKind::Srgb | QuantityKind::LinearSrgb) => ColorTags {
                 primaries: Some(NamedPrimaries::Srgb.chromaticities()),
-                encoding: Some(Encoding::Srgb),
+                encoding: Some(if kind == QuantityKind::Srgb { Encoding::Srgb } else { Encoding::Linear }),
                 ..ColorTags::default()
             },
             _ => {
@@ -136,12 +137,12 @@ impl Scene {
         Ok((encoding, primaries))
     }
 
-    /// What a user should know of a scene of a picture; `luminances` of its white are the one chosen and the one that its file tells.
-    fn tell(&self, header: &FrameHeader, illuminant: &str, luminances: [Option<f64>; 2], found: &mut Found) {
+    /// What a user should know of a scene of a picture; of its white the luminance that its file tells, and where.
+    fn tell(&self, header: &FrameHeader, illuminant: &str, told: Option<(f64, &str)>, found: &mut Found) {
         /// More channels are not named one by one.
         const MOST_NAMED: usize = 16;
-        let [chosen, told] = luminances;
-        let white_luminance = chosen.or(told).unwrap_or(WHITE_LUMINANCE);
+        let chosen = self.picture.luminance;
+        let white_luminance = chosen.or(told.map(|(luminance, _)| luminance)).unwrap_or(WHITE_LUMINANCE);
         let name = &header.name;
         let others = &header.geometry.channels[3..];
         if !others.is_empty() {
@@ -160,12 +161,14 @@ impl Scene {
              {white_luminance} cd/m2 under {illuminant}"
         )));
         let known = match (chosen, told) {
-            (Some(chosen), Some(told)) if (chosen / told - 1.0).abs() > SAME_LUMINANCE => Some(Note::Warning(format!(
-                "{name}: its white has {told} cd/m2 by its own attribute (whiteLuminance), and {chosen} by --luminance, which counts"
-            ))),
+            (Some(chosen), Some((told, place))) if (chosen / told - 1.0).abs() > SAME_LUMINANCE => {
+                Some(Note::Warning(format!(
+                    "{name}: its white has {told} cd/m2 by its own {place}, and {chosen} by --luminance, which counts"
+                )))
+            }
             (Some(_), _) => None,
-            (None, Some(told)) => {
-                Some(Note::Remark(format!("{name}: its white has {told} cd/m2 by its whiteLuminance")))
+            (None, Some((told, place))) => {
+                Some(Note::Remark(format!("{name}: its white has {told} cd/m2 by its own {place}")))
             }
             (None, None) => {
                 let text =
@@ -174,5 +177,17 @@ impl Scene {
             }
         };
         found.notes.extend(known);
+    }
+}
+
+/// The luminance of white that a picture tells, and where: of one that the toolchain made in its metadata, else in its own tags.
+fn told_white(reader: &FrameReader) -> Option<(f64, &'static str)> {
+    let of_tags = reader.colors().white_luminance.map(|luminance| (luminance, "attribute (whiteLuminance)"));
+    let metadata = &reader.header().metadata;
+    match metadata.quantity {
+        QuantityKind::Srgb | QuantityKind::LinearSrgb => {
+            metadata.white_luminance().map(|luminance| (luminance, "metadata")).or(of_tags)
+        }
+        _ => of_tags,
     }
 }

@@ -205,7 +205,10 @@ impl Scene {
                         .map_err(|error| beside(error, first, &likely))?;
                 }
                 if let Some(what) = table.uvspec() {
-                    let problem = format!("{}: {what}, or choose one with --column NAME or --sample N", table.name());
+                    let problem = format!(
+                        "{}: {what}; --column NAME or --sample N is for a column that is a radiance after all",
+                        table.name()
+                    );
                     return Err(Error::Usage(problem));
                 }
                 let names: Vec<&str> = table.columns.iter().take(SHOWN).map(String::as_str).collect();
