@@ -737,41 +737,6 @@ fn regions_of_taps_and_drift_scatter_as_predicted() {
     assert!(of_smallest(smallest, tests) > 1e-4, "{smallest} of {tests}");
 }
 
-/// The same where full well cuts off what rows and columns share, of photosites before demosaicking and of pixels: means scatter as
-/// predicted, and standard deviations lie about theirs.
-#[test]
-fn full_photosites_of_several_taps_scatter_as_predicted() {
-    let seeds = trials(1500);
-    for taps in [&several_taps()[1], &several_taps()[4]] {
-        let scene = tapped_with_lines([26, 22], [29_700.0, 29_000.0, 30_200.0], taps);
-        let part = [Region { x: 5, y: 3, width: 16, height: 15 }];
-        let mut laws = [Laws::default(), Laws::default(), Laws::default()];
-        // Heads count what is saturated, on which no law hangs.
-        let head = digitized(&noisy(&scene, &settings(0))).header;
-        let mut of = |seed: u64| {
-            let codes = MemoryFrame::new(head.clone(), digitized(&noisy(&scene, &settings(seed + 40_000))).samples);
-            let plane = plane_of(&codes);
-            let frames = [&codes, &plane, &demosaicked(&plane, Method::Bilinear)];
-            let mut found = Vec::new();
-            for (frame, laws) in frames.into_iter().zip(&mut laws) {
-                let report = regions_among(laws, frame, &part, Equations::Exact).remove(0);
-                found.extend(report.channels.into_iter().chain(report.classes));
-            }
-            found
-        };
-        let all: Vec<_> = (0..seeds).map(&mut of).collect();
-        let n = seeds as f64;
-        for index in 0..all[0].len() {
-            let z_mean = all.iter().map(|channels| channels[index].z_mean.unwrap());
-            let p = of_chi_square(z_mean.clone().map(|z| z * z).sum(), n);
-            assert!(p > 1e-6 && (z_mean.sum::<f64>() / n).abs() < 5.0 / n.sqrt(), "{:?} {index}: {p}", taps.layout);
-            // Roots of variances lie below that of their mean by a quarter of its relative variance, here 0.05 standard errors.
-            let z_std = all.iter().map(|channels| channels[index].z_std.unwrap()).sum::<f64>() / n;
-            assert!(z_std.abs() < 5.0 / n.sqrt() + 0.1, "{:?} {index}: {z_std}", taps.layout);
-        }
-    }
-}
-
 /// What is not predicted is refused with the key in the reason.
 #[test]
 fn what_taps_and_drift_leave_open_is_refused() {
