@@ -630,8 +630,8 @@ fn pixels_of_several_taps_scatter_as_predicted() {
     let mut tests = 0;
     let methods = [Method::Bilinear, Method::EffectiveColor, Method::Malvar, Method::Bilinear, Method::EffectiveColor];
     let cases = several_taps().into_iter().zip(methods);
-    let scenes: [fn([usize; 2], [f32; 3], &Taps) -> MemoryFrame; 2] = [tapped, tapped_with_lines];
-    for ((taps, method), scene) in cases.flat_map(|case| scenes.map(|scene| (case.clone(), scene))) {
+    for ((taps, method), has_lines) in cases.flat_map(|case| [false, true].map(|has_lines| (case.clone(), has_lines))) {
+        let scene = if has_lines { tapped_with_lines } else { tapped };
         let scene = scene([22, 18], [900.0, 2500.0, 1800.0], &taps);
         let made = |seed: u64| {
             let plane = plane_of(&digitized(&noisy(&scene, &settings(seed + 90_000))));
@@ -737,40 +737,6 @@ fn regions_of_taps_and_drift_scatter_as_predicted() {
     assert!(of_smallest(smallest, tests) > 1e-4, "{smallest} of {tests}");
 }
 
-/// The same where full well cuts off what rows and columns share, of photosites before demosaicking and of pixels: means scatter as
-/// predicted, and standard deviations lie about theirs.
-#[test]
-fn full_photosites_of_several_taps_scatter_as_predicted() {
-    let seeds = trials(1500);
-    for taps in [&several_taps()[1], &several_taps()[4]] {
-        let scene = tapped_with_lines([26, 22], [29_700.0, 29_000.0, 30_200.0], taps);
-        let part = [Region { x: 5, y: 3, width: 16, height: 15 }];
-        let mut laws = [Laws::default(), Laws::default(), Laws::default()];
-        let mut of = |seed: u64| {
-            let mut codes = digitized(&noisy(&scene, &settings(seed + 40_000)));
-            codes.header.metadata.noise.as_mut().unwrap().sensor_seed = 0;
-            let plane = plane_of(&codes);
-            let frames = [&codes, &plane, &demosaicked(&plane, Method::Bilinear)];
-            let mut found = Vec::new();
-            for (frame, laws) in frames.into_iter().zip(&mut laws) {
-                let report = regions_among(laws, frame, &part, Equations::Exact).remove(0);
-                found.extend(report.channels.into_iter().chain(report.classes));
-            }
-            found
-        };
-        let all: Vec<_> = (0..seeds).map(&mut of).collect();
-        let n = seeds as f64;
-        for index in 0..all[0].len() {
-            let z_mean = all.iter().map(|channels| channels[index].z_mean.unwrap());
-            let p = of_chi_square(z_mean.clone().map(|z| z * z).sum(), n);
-            assert!(p > 1e-6 && (z_mean.sum::<f64>() / n).abs() < 5.0 / n.sqrt(), "{:?} {index}: {p}", taps.layout);
-            // Roots of variances lie below that of their mean by a quarter of its relative variance, here 0.05 standard errors.
-            let z_std = all.iter().map(|channels| channels[index].z_std.unwrap()).sum::<f64>() / n;
-            assert!(z_std.abs() < 5.0 / n.sqrt() + 0.1, "{:?} {index}: {z_std}", taps.layout);
-        }
-    }
-}
-
 /// What is not predicted is refused with the key in the reason.
 #[test]
 fn what_taps_and_drift_leave_open_is_refused() {
@@ -827,6 +793,7 @@ fn regions_or(frame: &MemoryFrame, region: Region) -> cyanometer::error::Result<
 /// What is predicted of taps that do not differ is what is predicted of one, at each stage and of a region of a frame: sums in another order,
 /// 10⁻¹² of them, and of the law of a variance, whose ends are cut off after a part in 10⁸, as much.
 #[test]
+#[allow(clippy::too_many_lines, reason = "one sensor and its twin, stage after stage")]
 fn taps_that_do_not_differ_predict_as_one() {
     let light = [900.0, 2500.0, 1800.0];
     for (layout, count) in [(TapLayout::Columns, 3), (TapLayout::TopBottom, 2), (TapLayout::Quadrants, 4)] {
@@ -881,14 +848,17 @@ fn taps_that_do_not_differ_predict_as_one() {
         };
         for (found, wanted) in stages(&several).iter().zip(&stages(&alone)) {
             let [found, wanted] = [found, wanted].map(|frame| regions(frame, &[some]).remove(0));
-            let all = |report: &RegionReport| {
-                let channels = report.channels.iter().chain(&report.classes).filter(|_| true);
-                channels.map(|channel| [channel.z_mean, channel.mean_error, channel.std_error]).collect::<Vec<_>>()
+            let all = |report: &RegionReport| -> Vec<[Option<f64>; 3]> {
+                let channels = report.channels.iter().chain(&report.classes);
+                channels.map(|channel| [channel.z_mean, channel.mean_error, channel.std_error]).collect()
             };
-            for (found, wanted) in all(&found).iter().flatten().zip(all(&wanted).iter().flatten()) {
-                // Of a plane of several classes fourth cumulants are those of all its samples, or less their mean's.
-                let (found, wanted) = (found.unwrap(), wanted.unwrap());
-                assert!((found - wanted).abs() < 1e-4 * wanted.abs(), "{layout:?}: {found} {wanted}");
+            // Third cumulants of the classes of a plane, with the distances of their means, count where taps are told alone.
+            let tolerance = |index: usize| if index == 0 && !found.classes.is_empty() { 2e-3 } else { 1e-9 };
+            for (index, (found, wanted)) in all(&found).into_iter().zip(all(&wanted)).enumerate() {
+                for (found, wanted) in found.into_iter().flatten().zip(wanted.into_iter().flatten()) {
+                    let close = (found - wanted).abs() < tolerance(index) * wanted.abs();
+                    assert!(close, "{layout:?} {index}: {found} {wanted}");
+                }
             }
             for (found, wanted) in found.tests.iter().zip(&wanted.tests) {
                 close(found.expected, wanted.expected, "tests");

@@ -343,7 +343,7 @@ mod tests {
                 }
             }
             if is_shared {
-                let thirds = [&found, &one].map(|law| law.variance_thirds.unwrap());
+                let thirds = [found, &one].map(|law| law.variance_thirds.unwrap());
                 // Places of whose growth large ones follow do not reach over three lines and their pixels.
                 (0..3).for_each(|i| close(thirds[0][i], thirds[1][i], 1e5 * thirds[1][i]));
             }
@@ -412,6 +412,7 @@ mod tests {
         })
     }
 
+    #[allow(clippy::too_many_lines, reason = "one set of matrices for all sums")]
     fn check_by_full_matrices(pixels: &TappedPixels, lines: Option<&TapLines>, what: &str) {
         let [x0, y0, width, height] = PART;
         let [columns, rows] = [33_usize, 28];

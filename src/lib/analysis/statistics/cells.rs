@@ -273,6 +273,7 @@ mod tests {
 
     /// By full matrices over all samples: sums of up to 10⁴ products, relative 10⁻¹².
     #[test]
+    #[allow(clippy::too_many_lines, reason = "one set of matrices for all sums")]
     fn cells_agree_with_full_matrices() {
         for seen in [Seen::Planes, Seen::Class(Class::Green), Seen::Class(Class::Blue), Seen::All] {
             let sites = sites(0.2, seen != Seen::Planes);
