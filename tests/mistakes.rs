@@ -488,11 +488,6 @@ const MISTAKES: [(&str, i32, &str); 139] = [
         "--patches[=<WxH>] and --region <X,Y,W,H> exclude each other; see `measure --help`",
     ),
     (
-        "color-difference 50,2.67,-79.8 50,0,-82.7",
-        BAD_USAGE,
-        "50,2.67,-79.8 is no color in XYZ: X, Y and Z are not negative; L,a,b are given with --space lab",
-    ),
-    (
         "color-difference xyz.exr xyz.exr xyz.exr",
         BAD_USAGE,
         "unknown option or extra argument `xyz.exr`; the program takes two inputs; see `color-difference --help`",

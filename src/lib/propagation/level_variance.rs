@@ -144,7 +144,8 @@ impl LevelVariance {
     pub fn is_told(&self, level: f64) -> bool {
         // What is no level has a neighbor's variance.
         let is_by_code = level < self.told_from;
-        !is_by_code && !(self.of.photosite.has_tails() && self.at(level).is_nan())
+        let takes_long = || self.of.photosite.has_tails() && self.at(level).is_nan();
+        !(is_by_code || takes_long())
     }
 
     /// The variance at a level; below zero as at zero, beyond the last as there.

@@ -379,29 +379,36 @@ mod tests {
     }
 
     /// Readings that jump by −a, 0 or a, a exponential of mean A, are off by nothing or, half of them, by a number of density
-    /// e^(−|x|/A)/2A: with a normal one beside it the chance that both are beyond a code's step has a closed form, of whose square the
-    /// trapezoidal rule makes the covariance. Panels of 5 nodes in a are good to 10⁻⁶ of what jumps do.
+    /// e^(−|x|/A)/2A: the chance that such a one and a normal one together are beyond a code has a closed form. Means are sums of it over
+    /// the codes from the lowest on, the covariance that of the trapezoidal rule. Panels of 5 nodes in a are good to 10⁻⁶ of what jumps do.
     #[test]
-    fn jumps_beside_a_step_blur_what_rows_share() {
+    fn jumps_beside_an_end_of_the_codes_bend_what_rows_share() {
+        const OWN_E: f64 = 5.0;
         let beyond = |x: f64, jump_e: f64| {
             let [ratio, z] = [OWN_E / jump_e, x / OWN_E];
             let tail = |sign: f64| (0.5 * ratio * ratio - sign * x / jump_e).exp() * cumulative(sign * z - ratio);
             cumulative(-z) + 0.5 * (tail(1.0) - tail(-1.0))
         };
-        for (row, jump_e, share, off) in
-            [(50.0, 60.0, 0.3, 0.0), (50.0, 60.0, 0.3, 70.0), (12.0, 15.0, 1.0, -20.0), (100.0, 40.0, 0.05, 30.0)]
+        for (row, jump_e, share, charge_e) in
+            [(4.0, 12.0, 0.05, 2.0), (4.0, 12.0, 0.3, 11.0), (2.0, 5.0, 1.0, 0.0), (8.0, 6.0, 0.5, 7.0)]
         {
             let mut site = of_one_bit(row, 0.0);
+            site.model.read_noise_e = OWN_E;
             site.model.tails = Tails { rts_share: share, rts_e: jump_e, ..Tails::default() };
+            let site = Photosite { adc: Some(AdcRecord::new(12, 0.0, 1.0)), ..site };
             let of_line = |z: f64| {
-                let x = -off - row * z;
-                (1.0 - 0.5 * share) * cumulative(-x / OWN_E) + 0.5 * share * beyond(x, jump_e)
+                let chance = |code: i32| {
+                    let x = f64::from(code) + 0.5 - charge_e - row * z;
+                    (1.0 - 0.5 * share) * cumulative(-x / OWN_E) + 0.5 * share * beyond(x, jump_e)
+                };
+                (0..500).map(chance).sum::<f64>()
             };
-            let steps = || (-800..=800).map(|step| 0.01 * f64::from(step));
-            let mean = |of: &dyn Fn(f64) -> f64| steps().map(|z| 0.01 * density(z) * of(z)).sum::<f64>();
-            let wanted = mean(&|z| of_line(z).powi(2)) - mean(&of_line).powi(2);
-            let found = site.lines([5e4 + off; 3]).unwrap()[0].row[1];
-            assert!((found - wanted).abs() < 2e-6 * wanted, "{row} {jump_e} {off}: {found} {wanted}");
+            let steps = (-400..=400).map(|step| 0.02 * f64::from(step));
+            let means: Vec<(f64, f64)> = steps.map(|z| (0.02 * density(z), of_line(z))).collect();
+            let mean: f64 = means.iter().map(|(weight, mean)| weight * mean).sum();
+            let wanted: f64 = means.iter().map(|(weight, of_line)| weight * (of_line - mean).powi(2)).sum();
+            let found = site.lines([charge_e; 3]).unwrap()[0].row[1];
+            assert!((found - wanted).abs() < 2e-6 * wanted, "{row} {jump_e} {charge_e}: {found} {wanted}");
         }
     }
 

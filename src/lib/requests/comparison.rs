@@ -112,7 +112,7 @@ impl ColorPair {
     ///
     /// # Errors
     ///
-    /// Those of readers, and of [`Comparison::new`]; [`Error::Usage`] for XYZ below 0.
+    /// Those of readers, and of [`Comparison::new`].
     pub fn open(&self) -> Result<(Comparison<FrameReader>, Vec<Note>)> {
         check_inputs([&self.a, &self.b].into_iter().filter_map(FrameOrColor::path).map(Some))?;
         let Self { space, white, white_luminance, part, crop, .. } = *self;
@@ -121,19 +121,9 @@ impl ColorPair {
             let option: &[_] = if crop.is_some() { &["crop"] } else { &["part"] };
             return Err(Error::Usage("both are colors, of which there are no parts".into()).leave_out(option));
         }
-        let is_negative =
-            |side: &&FrameOrColor| matches!(side, FrameOrColor::Color(color) if color.iter().any(|x| *x < 0.0));
-        if let Some(FrameOrColor::Color([x, y, z])) = [&self.a, &self.b].into_iter().find(is_negative)
-            && space != Some(Space::Lab)
-        {
-            let problem = format!(
-                "{x},{y},{z} is no color in XYZ: X, Y and Z are not negative; L,a,b are given with --space lab"
-            );
-            return Err(Error::Usage(problem));
-        }
         let settings = ComparisonSettings { space, white, white_luminance };
         let comparison = Comparison::new(self.a.open(part, crop)?, self.b.open(part, crop)?, &settings)?;
-        let mut notes = Vec::new();
+        let mut notes: Vec<Note> = self.doubt_of_negatives().into_iter().collect();
         if comparison.white().is_none() && (white.is_some() || white_luminance.is_some()) {
             let text = "both are L*a*b* already; --white and --white-luminance have no effect";
             notes.push(Note::Warning(text.into()));
@@ -145,6 +135,20 @@ impl ColorPair {
         notes.extend(comparison.frames().flat_map(notes::of_reader));
         notes.extend(doubt_of_places(&comparison));
         Ok((comparison, notes))
+    }
+}
+
+impl ColorPair {
+    /// A warning of numbers that are no color in XYZ, as those of L\*a\*b\* may not be.
+    fn doubt_of_negatives(&self) -> Option<Note> {
+        let is_negative =
+            |side: &&FrameOrColor| matches!(side, FrameOrColor::Color(color) if color.iter().any(|x| *x < 0.0));
+        let side = [&self.a, &self.b].into_iter().find(is_negative).filter(|_| self.space != Some(Space::Lab))?;
+        let FrameOrColor::Color([x, y, z]) = side else { return None };
+        let text = format!(
+            "{x},{y},{z} counts as XYZ, in which colors have no negative numbers; L,a,b are given with --space lab"
+        );
+        Some(Note::Warning(text))
     }
 }
 
@@ -187,17 +191,18 @@ mod tests {
     }
 
     #[test]
-    fn a_negative_number_makes_no_xyz() {
+    fn negative_numbers_of_xyz_are_told() {
         let said = |space| {
             let (a, b) = (FrameOrColor::Color([50.0, 2.67, -79.8]), FrameOrColor::Color([50.0, 0.0, 0.0]));
             let pair = ColorPair { a, b, space, white: None, white_luminance: None, part: 0, crop: None };
-            pair.open().map_err(|error| error.to_string()).err()
+            pair.open().unwrap().1
         };
-        let wanted = "50,2.67,-79.8 is no color in XYZ: X, Y and Z are not negative; L,a,b are given with --space lab";
+        let wanted =
+            "50,2.67,-79.8 counts as XYZ, in which colors have no negative numbers; L,a,b are given with --space lab";
         for space in [None, Some(Space::Xyz)] {
-            assert_eq!(said(space).as_deref(), Some(wanted));
+            assert_eq!(said(space), [Note::Warning(wanted.into())]);
         }
-        assert_eq!(said(Some(Space::Lab)), None);
+        assert_eq!(said(Some(Space::Lab)), []);
     }
 
     #[test]
