@@ -9,7 +9,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 139] = [
+const MISTAKES: [(&str, i32, &str); 138] = [
     (
         "preview codes.exr plane.exr -o {steam}.png",
         BAD_USAGE,

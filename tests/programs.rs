@@ -419,7 +419,7 @@ fn two_colors_are_compared() {
     // Negative numbers are no options, wherever they stand.
     let found = shop.difference("--space lab 50,2.6772,-79.7751 -50,2.6772,-79.7751");
     assert!(close(&found["delta_e_94"]["mean"], 100.0, 1e-9));
-    let found = shop.difference("-1,2,3 -1,2,3");
+    let found = shop.difference("-1,2,3 -1,2,3 --space lab");
     assert_eq!(found["delta_e_76"]["below_tenth"], 1.0);
     // The first is the reference of the 1994 formula, by whose chroma of 50 the second's is weighed.
     let found = shop.difference("60,30,40 60,0,0 --space lab");

@@ -25,6 +25,9 @@ const MOST_STEPPED: usize = 6000;
 /// Evaluations that a sum may take, a tenth of a second.
 const MOST_WORK: u64 = 16_000_000;
 
+/// The same where photosites are unlike each other, of which there are several sums for each stage.
+const MOST_WORK_OF_UNLIKE: u64 = 3_000_000;
+
 /// Why nothing is said where a sum takes more.
 const TAKES_LONG: &str = "full well, an end of the codes or their rounding bends what rows or columns share, and all counts of light and \
                           dark signal beside each of its values take too many evaluations";
@@ -99,7 +102,9 @@ impl Photosite {
 ///
 /// [`Unpredictable::Beyond`] where they are too many.
 pub(super) fn curved(sites: &[(Photosite, [f64; 3])], axes: &[Axis]) -> Predicted<DMatrix<f64>> {
-    let found = effort::within(MOST_WORK, || curved_within(sites, axes));
+    let are_unlike = sites.iter().any(|(site, _)| site.has_tails());
+    let most_work = if are_unlike { MOST_WORK_OF_UNLIKE } else { MOST_WORK };
+    let found = effort::within(most_work, || curved_within(sites, axes));
     found.unwrap_or(Err(Unpredictable::Beyond(TAKES_LONG)))
 }
 
