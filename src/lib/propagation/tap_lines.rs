@@ -1,7 +1,7 @@
 //! What photosites of a row, or of a column, share where several amplifiers read them.
 //!
 //! The reading of a photosite of class k behind amplifier a is y_ak(x, u, v), x what is its own, u and v what its row has
-//! ([`lines`](super::lines)); amplifiers differ by what they make of a charge, and the row is the same to all, so that
+//! (`lines`); amplifiers differ by what they make of a charge, and the row is the same to all, so that
 //!
 //! cov(y_ak, y_bl) = cov(m_ak(u, v), m_bl(u, v)),  m_ak(u, v) = E\[y_ak | u, v]
 //!
