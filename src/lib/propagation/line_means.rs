@@ -47,6 +47,8 @@ pub(super) struct LineMeans {
     jumps: Vec<(f64, f64)>,
     reading: Reading,
     adc: Option<AdcRecord>,
+    /// Charges at which the codes end.
+    ends_e: [f64; 2],
     spacing_e: f64,
     known: RefCell<BTreeMap<i64, f64>>,
 }
@@ -55,18 +57,17 @@ pub(super) struct LineMeans {
 struct Kind {
     share: f64,
     law: Law,
-    /// The mean charge, what is beyond full well left out.
-    charge_e: f64,
+    /// The mean charge, what is beyond full well left out; none where something of how codes are rounded is left.
+    charge_e: Option<f64>,
     /// The least and the largest that is read, but for what is added.
     reach_e: [f64; 2],
-    /// Whether next to nothing of how codes are rounded is left.
-    is_smooth: bool,
 }
 
 impl LineMeans {
     /// Of samples about the center that `about` has, where no less than `blur_e` blurs codes.
     pub fn of(kinds: &Kinds, about: &Law, adc: Option<AdcRecord>, blur_e: f64) -> Self {
         let reading = adc.map_or_else(|| about.of_electrons(), |adc| about.of_codes(&adc, codes_of(&adc)));
+        let is_smooth = adc.is_none_or(|adc| adc.linearization.is_none() && adc.adu_per_e * blur_e >= STRAIGHT);
         let kind = |(share, law): &(f64, Law)| {
             let electrons = law.of_electrons();
             let [least, most] = law.extent().map(|charge| charge.min(law.full_well_e));
@@ -74,9 +75,8 @@ impl LineMeans {
             Kind {
                 share: *share,
                 law: *law,
-                charge_e: law.expect(&electrons)[0] + electrons.center,
+                charge_e: is_smooth.then(|| law.expect(&electrons)[0] + electrons.center),
                 reach_e: [least - noise_e, most + noise_e],
-                is_smooth: adc.is_none_or(|adc| adc.linearization.is_none() && adc.adu_per_e * blur_e >= STRAIGHT),
             }
         };
         Self {
@@ -84,6 +84,9 @@ impl LineMeans {
             jumps: kinds.jumps.clone(),
             reading,
             adc,
+            ends_e: adc.map_or([f64::NEG_INFINITY, f64::INFINITY], |adc| {
+                [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code))
+            }),
             spacing_e: DISTANCE * blur_e,
             known: RefCell::default(),
         }
@@ -132,14 +135,12 @@ impl LineMeans {
     /// M, by each kind.
     fn quiet(&self, offset_e: f64) -> f64 {
         let reading = self.reading.off_by(offset_e);
-        let mean = |kind: &Kind| {
-            let Some(adc) = self.adc else { return kind.charge_e - reading.center + offset_e };
-            let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
-            let [low, high] = kind.reach_e;
-            match kind.is_smooth && low + offset_e > lower && high + offset_e < upper {
-                true => adc.sample(adc.level_at(kind.charge_e + offset_e)) - reading.center,
-                false => kind.law.expect(&reading)[0],
-            }
+        let [lower, upper] = self.ends_e;
+        let is_within = |[low, high]: [f64; 2]| self.adc.is_none() || low + offset_e > lower && high + offset_e < upper;
+        let mean = |kind: &Kind| match (kind.charge_e.filter(|_| is_within(kind.reach_e)), self.adc) {
+            (Some(charge_e), None) => charge_e - reading.center + offset_e,
+            (Some(charge_e), Some(adc)) => adc.sample(adc.level_at(charge_e + offset_e)) - reading.center,
+            (None, _) => kind.law.expect(&reading)[0],
         };
         self.kinds.iter().map(|kind| kind.share * mean(kind)).sum()
     }

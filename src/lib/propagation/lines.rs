@@ -431,7 +431,7 @@ pub(super) struct LineTerms {
 
 impl LineTerms {
     pub fn at(&self, x: f64, y: f64) -> f64 {
-        self.constant + self.linear * (x + y) + self.square * x * y
+        self.between((x, [1.0; 2]), (y, [1.0; 2]))
     }
 
     /// The same of samples, of such signals and slopes to what is added to their lines and to what these have more of the light.

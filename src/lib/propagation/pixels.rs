@@ -107,9 +107,8 @@ struct PixelTaps {
 }
 
 impl PixelTaps {
-    /// The variances of what is the own of photosites, of which those of the sensor's slope share so much.
-    fn own(&self, level: [f64; 3], shared: [f64; 3]) -> [f64; 3 * TAPS] {
-        let whole = self.at(level);
+    /// What is the own of photosites, of such variances, of which those of the sensor's slope share so much.
+    fn own(&self, whole: [f64; 3 * TAPS], shared: [f64; 3]) -> [f64; 3 * TAPS] {
         std::array::from_fn(|index| {
             let slope = self.slopes.get(index / 3).copied().unwrap_or_default();
             (whole[index] - slope * slope * shared[index % 3]).max(0.0)
@@ -215,6 +214,7 @@ impl PixelNoise {
         // What was divided by a flat field had this share of its light, and was so much less.
         let share = self.variances.share([x, y]);
         let level = rgb.map(|sample| (sample - self.black) * share);
+        let of_taps = self.of_taps.as_ref().map(|taps| (taps, taps.at(level)));
         let all = |mut variances: [f64; 3], hues: Option<[f64; 3]>| {
             let lines = self.of_lines.as_ref().map(|lines| (lines, lines.at(level)));
             let shared = lines.as_ref().map(|(lines, level)| lines.of_sites(level));
@@ -222,8 +222,8 @@ impl PixelNoise {
                 let off = |(variance, shared): (&mut f64, f64)| *variance = (*variance - shared).max(0.0);
                 variances.iter_mut().zip(shared).for_each(off);
             }
-            let mut covariance = match &self.of_taps {
-                Some(taps) => taps.gains[kind].covariance(taps.own(level, shared.unwrap_or_default()), hues),
+            let mut covariance = match of_taps {
+                Some((taps, whole)) => taps.gains[kind].covariance(taps.own(whole, shared.unwrap_or_default()), hues),
                 None => self.gains[kind].covariance(variances, hues),
             };
             if let Some((lines, level)) = &lines {
@@ -236,10 +236,10 @@ impl PixelNoise {
             }
             covariance.map(|covariance| covariance / (share * share))
         };
-        let of_taps = self.of_taps.as_ref().map(|taps| taps.at(level));
-        let is_told = self.variances.are_told(level) && of_taps.iter().flatten().all(|variance| !variance.is_nan());
+        let of_any_tap = || of_taps.iter().flat_map(|(_, whole)| whole);
+        let is_told = self.variances.are_told(level) && of_any_tap().all(|variance| !variance.is_nan());
         let mut variances = self.variances.at(level, share);
-        for (index, of_tap) in of_taps.iter().flatten().enumerate() {
+        for (index, of_tap) in of_any_tap().enumerate() {
             variances[index % 3] = variances[index % 3].max(*of_tap);
         }
         if !self.depends_on_hue {

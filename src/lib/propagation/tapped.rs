@@ -332,6 +332,11 @@ impl TappedPixels {
         self.array.axes.iter().map(|axis| axis.lines.len() as f64).product()
     }
 
+    /// How far the mean of a kind lies from that of all.
+    pub(super) fn off(&self, kind: &Kind) -> [f64; 3] {
+        [0, 1, 2].map(|i| kind.mean[i] - self.mean[i])
+    }
+
     /// Pixels of the rectangle up to so far away from a place, and how far they are.
     pub(super) fn near(&self, at: [usize; 2], far: isize) -> impl Iterator<Item = (&Kind, [isize; 2])> {
         let lines = |axis: usize| {
@@ -352,7 +357,7 @@ impl TappedPixels {
     /// Covariance of what is between the means of kinds of places.
     pub fn between(&self) -> Matrix3<f64> {
         let of_kind = |kind: &Kind| {
-            let off = [0, 1, 2].map(|i| kind.mean[i] - self.mean[i]);
+            let off = self.off(kind);
             kind.share * product(&off, &off)
         };
         self.kinds.iter().map(of_kind).sum()

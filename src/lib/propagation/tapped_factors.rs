@@ -65,9 +65,7 @@ impl Factors {
         }
         Loads { rank, loads: found }
     }
-}
 
-impl Factors {
     /// What two photosites share, each by amplifier and class.
     pub fn between(&self, [tap, class]: [usize; 2], [other, of_other]: [usize; 2]) -> f64 {
         let load = |loads: &Vec<f64>, at: usize| loads.get(at).copied().unwrap_or_default();

@@ -106,7 +106,7 @@ impl Sums {
         times: f64,
         of_shared: &mut [[f64; 6]; 6],
     ) {
-        let off = |kind: &Kind| Vector3::from([0, 1, 2].map(|i| kind.mean[i] - pixels.mean[i]));
+        let off = |kind: &Kind| Vector3::from(pixels.off(kind));
         let pixel = pixels.kind(at);
         let (mut row_sum, mut moved) = (Matrix3::zeros(), Vector3::zeros());
         for (other, lag) in pixels.near(at, 2 * pixels.array.weights.reach()) {
@@ -148,7 +148,7 @@ impl Sums {
             if w == [0.0; 3] {
                 continue;
             }
-            let off = [0, 1, 2].map(|i| pixel.mean[i] - pixels.mean[i]);
+            let off = pixels.off(pixel);
             for (pair, [i, j]) in PAIRS.into_iter().enumerate() {
                 squares[pair] += w[i] * w[j];
                 moved[pair] += off[i] * w[j] + off[j] * w[i];

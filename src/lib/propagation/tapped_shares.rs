@@ -38,11 +38,6 @@ struct Lines<'a> {
     totals: Vec<Vec<([f64; 3], Matrix3<f64>)>>,
 }
 
-/// How far a mean lies from that of all.
-fn off(pixels: &TappedPixels, kind: &Kind) -> [f64; 3] {
-    [0, 1, 2].map(|i| kind.mean[i] - pixels.mean[i])
-}
-
 impl Lines<'_> {
     fn loads<'a>(&self, kind: &'a Kind) -> Option<&'a Loads> {
         kind.loads.as_ref().map(|loads| &loads[self.axis])
@@ -80,7 +75,7 @@ impl Lines<'_> {
             let mut found = vec![([0.0; 3], Matrix3::zeros()); self.rank()];
             for (kind, offset, count) in self.around(pixels, line) {
                 let Some(loads) = self.loads(kind) else { continue };
-                let off = off(pixels, kind);
+                let off = pixels.off(kind);
                 for ((total, of_distances), load) in found.iter_mut().zip(loads.at(offset)) {
                     for i in 0..3 {
                         total[i] += count * load[i];

@@ -80,7 +80,19 @@ pub struct Cell {
     pub class: Option<Class>,
 }
 
+impl Cell {
+    /// Whether photosites of a class are among them.
+    fn has(&self, class: Class) -> bool {
+        self.class.is_none_or(|of| of == class)
+    }
+}
+
 impl Cells {
+    /// Whether they are of a plane behind a filter array.
+    fn are_of_plane(&self) -> bool {
+        self.all.iter().any(|cell| cell.class.is_some())
+    }
+
     /// How many photosites there are in a cell.
     pub fn count(&self, cell: &Cell) -> f64 {
         self.rows[cell.row] * self.columns[cell.column]
@@ -89,11 +101,10 @@ impl Cells {
     /// What two photosites of a class have in common in a row on average, `line` that of two by their groups, over so many of its
     /// successive columns from any on.
     fn in_rows(&self, class: Class, columns: f64, line: impl Fn(usize, usize) -> f64) -> f64 {
-        let is_of = |cell: &&Cell| cell.class.is_none_or(|of| of == class);
         let (mut sum, mut all) = (0.0, 0.0);
         for row in 0..self.rows.len() {
             let mut counts: BTreeMap<usize, f64> = BTreeMap::new();
-            for cell in self.all.iter().filter(|cell| cell.row == row).filter(is_of) {
+            for cell in self.all.iter().filter(|cell| cell.row == row && cell.has(class)) {
                 *counts.entry(cell.group).or_default() += self.count(cell);
             }
             let (n, groups) = (counts.values().sum::<f64>(), counts.len() as f64);
@@ -125,7 +136,7 @@ impl TappedSites {
     /// turns, behind any.
     fn between_classes(&self, k: usize, l: usize) -> [f64; 2] {
         let Some(lines) = &self.lines else { return [0.0; 2] };
-        let is_plane = self.cells.all.iter().any(|cell| cell.class.is_some());
+        let is_plane = self.cells.are_of_plane();
         let groups = 0..self.groups.len();
         lines.axes().map(|line| {
             let of = |g: usize, h: usize| line[(3 * g + k, 3 * h + l)];
@@ -142,7 +153,7 @@ impl TappedSites {
     /// place, with what the means of amplifiers have in common.
     pub fn covariance(&self) -> Matrix3<f64> {
         let classes = pooled(&self.groups);
-        let is_plane = self.cells.all.iter().any(|cell| cell.class.is_some());
+        let is_plane = self.cells.are_of_plane();
         let off = |group: &Group, i: usize| group.sites[i].moments.mean - classes[i].moments.mean;
         Matrix3::from_fn(|i, j| {
             if i == j {
@@ -263,7 +274,7 @@ pub(super) fn parts(frame: &FrameHeader) -> Vec<Part> {
         return vec![Part { tap: 0, counts: [1.0; 3], frame: frame.clone() }];
     };
     let count = |group: usize, class: Class| -> f64 {
-        let is_here = |cell: &&Cell| cell.group == group && cell.class.is_none_or(|of| of == class);
+        let is_here = |cell: &&Cell| cell.group == group && cell.has(class);
         cells.all.iter().filter(is_here).map(|cell| cells.count(cell)).sum()
     };
     let part = |(group, tap): (usize, &usize)| Part {
