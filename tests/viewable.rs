@@ -47,7 +47,7 @@ fn samples(path: &Path) -> Vec<u32> {
 }
 
 /// What is stored: the same read without what the metadata say of scales, and of codes, which scaled ones would not be.
-fn stored(path: &Path) -> Vec<f32> {
+fn stored(path: &Path, all_channels: bool) -> Vec<f32> {
     let mut bytes = fs::read(path).unwrap();
     for (known, unknown) in
         [("sample_scale:", "sample_shape:"), ("\nadc:", "\nabc:"), ("\nwhite_level_adu:", "\nwhite_level_abc:")]
@@ -57,7 +57,8 @@ fn stored(path: &Path) -> Vec<f32> {
     }
     let copy = path.with_file_name(format!("bare-{}", path.file_name().unwrap().to_str().unwrap()));
     fs::write(&copy, bytes).unwrap();
-    let mut reader = FrameReader::open(&InputOptions { path: Some(copy), ..InputOptions::default() }).unwrap();
+    let mut reader =
+        FrameReader::open(&InputOptions { path: Some(copy), all_channels, ..InputOptions::default() }).unwrap();
     let mut samples = Vec::new();
     for _ in 0..reader.header().geometry.height {
         reader.read(1, &mut samples).unwrap();
@@ -79,7 +80,7 @@ fn a_pipeline_of_scaled_frames_has_the_samples_of_one_of_unscaled_ones() {
         let expected = samples(&plain.path(file));
         assert_eq!(expected, samples(&scaled.path(file)), "{file}");
         assert_eq!(expected, samples(&mixed.path(file)), "{file}");
-        let highest = stored(&scaled.path(file)).into_iter().fold(0.0, f32::max);
+        let highest = stored(&scaled.path(file), false).into_iter().fold(0.0, f32::max);
         assert!((0.3..=1.0).contains(&(f64::from(highest) / white)), "{file}: {highest}");
         let digest = |bench: &Workshop| {
             let text = fs::read_to_string(bench.path(&format!("{file}.yaml"))).unwrap();
@@ -209,8 +210,42 @@ fn a_white_of_xyz_is_recorded_and_scales_them() {
         assert_eq!(bench.sidecar("t.exr").sample_scale, Some(2.0_f64.powi(scale)));
         assert_eq!(bench.frame("t.exr").samples, bench.frame("xyz.exr").samples);
     }
+    // A luminance alone keeps the color of a white that the frame records, and colors without a white refer to that.
+    bench.run("to-xyz t.exr --white-luminance 200 -o brighter.exr", &[]);
+    assert_eq!(white("brighter.exr"), white("t.exr").map(|white| white.map(|value| 2.0 * value)));
+    bench.run("to-xyz t.exr --space lab -o lab.exr", &[]);
+    assert_eq!(white("lab.exr"), white("t.exr"));
+    bench.run("to-xyz t.exr --white d65 --space lab -o daylight.exr", &[]);
+    assert_eq!(white("daylight.exr").map(|white| white[1]), Some(100.0));
+    assert_ne!(white("daylight.exr"), white("t.exr"));
     let said = bench.said("to-xyz xyz.exr --white d50 -o t.exr", 1);
     assert!(said.contains("nothing tells how bright white is in it; give --white-luminance"), "{said}");
     let said = bench.said("to-xyz xyz.exr --white 1,0,1 -o t.exr", 2);
     assert!(said.contains("is impossible; all three must be above 0"), "{said}");
+}
+
+/// Means over frames are scaled, and variances by the square, in a part of their own; maps of differences by 100 as white.
+#[test]
+fn reports_of_pixels_are_scaled_too() {
+    let bench = set_up();
+    bench.run("render-radiance --electrons 3000,5000,7000 --size 6x4 -o rates.exr", &[]);
+    bench.run("add-noise rates.exr --seed 7 --frames 0..3 -o {frame}.exr", &[]);
+    let measure = "measure 0.exr 1.exr 2.exr --over frames -o report.txt --pixels";
+    bench.run(&format!("{measure} plain.exr"), &[]);
+    bench.run(&format!("{measure} shown.exr --viewable"), &[]);
+    let scale = bench.sidecar("shown.exr").sample_scale.unwrap();
+    let [plain, shown] = ["plain.exr", "shown.exr"].map(|name| bench.frame(name));
+    assert_eq!(shown.samples, plain.samples);
+    assert!(bench.bytes("shown.exr").windows(8).any(|window| window == b"variance"));
+    let (stored, known) = (stored(&bench.path("shown.exr"), true), samples(&bench.path("plain.exr")));
+    let ratio = |layer: usize| f64::from(stored[layer * 6]) / f64::from(f32::from_bits(known[layer * 6]));
+    assert_eq!([ratio(0), ratio(3)], [scale, scale * scale]);
+
+    bench.write_colors("a.exr", cyanometer::units::QuantityKind::Xyz, &[[50.0, 60.0, 70.0], [1.0, 2.0, 3.0]]);
+    bench.write_colors("b.exr", cyanometer::units::QuantityKind::Xyz, &[[51.0, 59.0, 70.0], [1.1, 2.0, 3.0]]);
+    let compare = "color-difference a.exr b.exr --white-luminance 100 -o report.txt --map";
+    bench.run(&format!("{compare} plain.exr"), &[]);
+    bench.run(&format!("{compare} shown.exr --viewable"), &[]);
+    assert_eq!(bench.sidecar("shown.exr").sample_scale, Some(1.0 / 128.0));
+    assert_eq!(bench.frame("shown.exr").samples, bench.frame("plain.exr").samples);
 }

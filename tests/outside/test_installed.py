@@ -4,6 +4,7 @@ a package of Debian's that hold the same, with every licence."""
 import gzip
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import tarfile
@@ -88,6 +89,13 @@ class Installed(BuiltCase):
             self.assertTrue((share / f"zsh/site-functions/_{program}").read_text().startswith(f"#compdef {program}"))
             self.assertIn(f"complete -c {program}", (share / f"fish/vendor_completions.d/{program}.fish").read_text())
 
+    def test_documents_lead_to_nothing_that_is_not_there(self):
+        document = self.prefix / "share/doc/cyanometer"
+        pages = [document / "README.md", *(document / "docs").rglob("*.md")]
+        links = [(page, link) for page in pages for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text())]
+        self.assertGreater(len(links), 100)
+        self.assertEqual([(page.name, link) for page, link in links if not (page.parent / link).exists()], [])
+
     def test_a_second_installation_replaces_the_first(self):
         run(ROOT / "scripts/install", "--prefix", self.prefix, "--built", self.built)
         self.assertEqual(sorted(path.name for path in (self.prefix / "bin").iterdir()), PROGRAMS)
@@ -140,7 +148,10 @@ class Packaged(BuiltCase):
         usr = self.directory / "deb/usr"
         own = {program if program == "cyanometer" else f"cyanometer-{program}" for program in PROGRAMS}
         self.assertEqual({path.name for path in (usr / "bin").iterdir()}, own)
-        self.assertIn("Linked with rawler", (usr / "share/doc/cyanometer/copyright").read_text())
+        documents = usr / "share/doc/cyanometer"
+        self.assertIn("Linked with rawler", (documents / "copyright").read_text())
+        self.assertIn("(changelog.gz)", (documents / "README.md").read_text())
+        self.assertTrue((documents / "changelog.gz").exists() and (documents / "sample_data/sensors").is_dir())
         install, remove = ((self.directory / "control" / script).read_text() for script in ("postinst", "prerm"))
         for program in PROGRAMS:
             if program != "cyanometer":

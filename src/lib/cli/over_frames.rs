@@ -6,6 +6,7 @@ use crate::formats::output;
 use crate::report::{self, ReportFormat};
 use crate::requests::measurement::SharedFrames;
 use crate::requests::of_over_frames;
+use crate::requests::options::Output;
 use std::path::Path;
 
 impl Session {
@@ -17,14 +18,14 @@ impl Session {
     pub fn tell_over_frames(
         &self,
         statistics: SharedFrames,
-        pixels: Option<&Path>,
+        pixels: Option<&Output>,
         format: ReportFormat,
         output: Option<&Path>,
     ) -> Result<()> {
         let (report, mut frame) = statistics.finish()?;
         let name = frame.header.name.clone();
-        if let Some(path) = pixels {
-            self.write_whole(&mut frame, path)?;
+        if let Some(place) = pixels {
+            self.write_whole(&mut frame, place)?;
         }
         self.tell(&of_over_frames(&report));
         output::write_text(output, &report::over_frames(&report, format)?)?;

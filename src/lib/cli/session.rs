@@ -340,10 +340,9 @@ impl Session {
     /// # Errors
     ///
     /// Those of the writer.
-    pub fn write_whole(&self, frame: &mut MemoryFrame, path: &Path) -> Result<()> {
+    pub fn write_whole(&self, frame: &mut MemoryFrame, output: &Output) -> Result<()> {
         self.sign(&mut frame.header);
-        let output = Output { output: Some(path.to_owned()), ..Output::default() };
-        self.write(&frame.header, &output, |writer, _| writer.write(&frame.samples).map(|()| Counts::default()))?;
+        self.write(&frame.header, output, |writer, _| writer.write(&frame.samples).map(|()| Counts::default()))?;
         Ok(())
     }
 

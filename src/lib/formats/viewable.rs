@@ -1,7 +1,7 @@
 //! Frames that viewers show which know no levels: samples scaled by a power of two, which loses nothing.
 //!
 //! What is stored are the samples times [`Metadata::sample_scale`](crate::metadata::Metadata::sample_scale), layers of
-//! standard deviations alike, and covariances times its square; the layer of marks stays as it is.
+//! standard deviations alike, and variances and covariances times its square; the layer of marks stays as it is.
 
 use super::format::U16_FULL_SCALE;
 use crate::error::{Error, Result};
@@ -9,6 +9,9 @@ use crate::frame::to_sample;
 use crate::metadata::FrameHeader;
 use crate::stages::saturation::MASK_LAYER;
 use crate::units::QuantityKind;
+
+/// The difference of black and white, ΔE\*ab.
+const DIFFERENCE_OF_WHITE: f64 = 100.0;
 
 /// Scales beyond these would take samples out of the range of floats.
 const LARGEST_EXPONENT: i32 = 60;
@@ -25,7 +28,7 @@ impl Scaling {
     /// That of a frame whose samples are stored times `scale`; none where all stay as they are.
     pub fn of(width: usize, channels: &[String], scale: f64) -> Option<Self> {
         let factor = |channel: &String| match channel.split_once('.') {
-            Some(("covariance", _)) => scale * scale,
+            Some(("covariance" | "variance", _)) => scale * scale,
             _ if channel == MASK_LAYER => 1.0,
             _ => scale,
         };
@@ -78,6 +81,7 @@ pub(super) fn scale_of(frame: &FrameHeader, fills_u16: bool) -> Result<f64> {
             let top = metadata.adc.filter(|_| fills_u16).map(|adc| f64::from(adc.top_code()));
             top.or(white).ok_or_else(|| no_white("add `white_level_adu` to its metadata"))?
         }
+        QuantityKind::ColorDifference => DIFFERENCE_OF_WHITE,
         QuantityKind::Xyz => {
             let white = metadata.color.as_ref().and_then(|color| color.white);
             let white = white.ok_or_else(|| no_white("give `to-xyz` --white-luminance CD_PER_M2"))?;

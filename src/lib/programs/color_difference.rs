@@ -25,6 +25,10 @@ struct Arguments {
     /// EXR file for the differences of each pixel, channels delta_e_76, jnd, delta_e_94, delta_e_2000
     #[arg(long, value_name = "FILE.exr", value_parser = values::exr_file())]
     map: Option<PathBuf>,
+    /// Scale the map by a power of two so that viewers show it: 100, the difference of black and white, comes into (½, 1].
+    /// Programs of this toolchain undo it to the bit
+    #[arg(long, requires = "map")]
+    viewable: bool,
     /// Form of the report; by default that of the ending of its file, or text
     #[arg(long, value_parser = values::choice::<ReportFormat>())]
     output_format: Option<ReportFormat>,
@@ -41,7 +45,7 @@ pub fn main() -> ExitCode {
     cli::start("color-difference", general, run)
 }
 
-fn run(Arguments { pair, map, output, output_format, .. }: &Arguments, session: &cli::Session) -> Result<()> {
+fn run(Arguments { pair, map, viewable, output, output_format, .. }: &Arguments, session: &cli::Session) -> Result<()> {
     if map.is_some() && same_place(map.as_deref(), output.as_deref()) {
         return Err(Error::Usage("the map and the report have the same place; name a file for each".into()));
     }
@@ -53,7 +57,7 @@ fn run(Arguments { pair, map, output, output_format, .. }: &Arguments, session: 
     if let Some(map) = map {
         let mut header = comparison.map_header()?;
         session.sign(&mut header);
-        let options = OutputOptions { path: Some(map.clone()), ..Default::default() };
+        let options = OutputOptions { path: Some(map.clone()), is_viewable: *viewable, ..Default::default() };
         writer = Some(FrameWriter::create(&options, &header)?);
     }
     let bar = session.progress(comparison.height());

@@ -55,8 +55,8 @@ fn run(arguments: &Arguments, session: &cli::Session) -> Result<()> {
             turn.session.report_reader(&reader);
             statistics.add(&mut reader)
         })?;
-        let pixels = arguments.measurement.pixels.as_deref();
-        return session.tell_over_frames(statistics, pixels, format, output);
+        let pixels = arguments.measurement.pixels_output();
+        return session.tell_over_frames(statistics, pixels.as_ref(), format, output);
     }
     let reports = Output { makes: Makes::Reports, ..Output::default() };
     let findings = Findings::new(format, frames.inputs.len() > 1, arguments.output.clone());

@@ -33,7 +33,7 @@ pub(super) const OF_SENSOR: &str = "sensor";
 /// Which colors are made of a frame, and by which matrix.
 #[derive(Debug, Clone, Args)]
 #[command(mut_arg("white", |option| option.help(
-    "White of lab, luv, srgb and linear-srgb, of XYZ that are there already recorded with any space: d65, d50, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative"
+    "White of lab, luv, srgb and linear-srgb, of XYZ that are there already recorded with any space: d65, d50, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative; by default that which XYZ record, or d65"
 )))]
 #[command(mut_arg("white_luminance", |option| option.help(
     "Luminance of the white d65, d50 or e in cd/m2; by default that at which the camera saturates, or of XYZ what they record. Of relative XYZ it is 1"
@@ -132,7 +132,7 @@ impl Conversion {
             residual: matrix.residual(),
             method: matrix.method,
             space: self.space,
-            white: self.white.white,
+            white: self.white.or_daylight(),
             white_luminance: self.white.white_luminance,
         };
         let mut stage = ToXyz::beside(frame, &settings, self.locus()?)?;
@@ -195,12 +195,12 @@ impl Conversion {
         /// Chromaticities that are nearer are those of one light.
         const NEAR: f64 = 0.005;
         let [x, y] = light_xy.filter(|_| needs_white(self.space))?;
-        let white = color::chromaticity(self.white.white.xyz(1.0));
+        let white = color::chromaticity(self.white.or_daylight().xyz(1.0));
         let is_far = (x - white[0]).abs().max((y - white[1]).abs()) > NEAR;
         is_far.then(|| {
             let text = format!(
                 "what is white in its light, x {x:.4}, y {y:.4}, is not that under the white {}; --adapt-to {} makes it so",
-                self.white.white, self.white.white
+                self.white.or_daylight(), self.white.or_daylight()
             );
             Note::Remark(text)
         })
@@ -212,7 +212,7 @@ impl Conversion {
         let text = format!(
             "by the matrix the white {} has no signal in one of the classes; its luminance is that of equal signals that saturate, \
              {luminance:.4} cd/m2: --white-luminance says another",
-            self.white.white
+            self.white.or_daylight()
         );
         Some(if needs_white(self.space) { Note::Warning(text) } else { Note::Remark(text) })
     }
@@ -253,7 +253,7 @@ impl Conversion {
         let shown = self.matrix_file().map_or("the matrix of its sensor".into(), |file| file.display().to_string());
         let of_codes = matrix.doubts_of_codes(&frame.metadata).into_iter();
         notes.extend(of_codes.map(|doubt| Note::Warning(format!("{}: {shown} {doubt}", frame.name))));
-        notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
+        notes.extend(doubt_of_white(self.white.or_daylight(), matrix.is_relative()));
         if let Some(file) = self.matrix_file().filter(|_| matrix.is_relative()) {
             let text = format!("{}: XYZ are relative, Y = 1 for the white that saturates the camera", file.display());
             notes.push(Note::Remark(text));
@@ -270,7 +270,7 @@ impl Conversion {
 
     /// What may not be meant about a frame of XYZ.
     pub fn doubt_of_xyz(&self, frame: &FrameHeader) -> Option<Note> {
-        doubt_of_white(self.white.white, frame.metadata.unit == RELATIVE_UNIT)
+        doubt_of_white(self.white.or_daylight(), frame.metadata.unit == RELATIVE_UNIT)
     }
 }
 

@@ -50,7 +50,11 @@ pub struct Measurement {
     over: Option<Over>,
     /// Write an EXR of the mean of each pixel over frames, and of its variance as the layer `variance.NAME`, divisor N − 1
     #[arg(long, value_name = "FILE", requires = "over")]
-    pub pixels: Option<PathBuf>,
+    pixels: Option<PathBuf>,
+    /// Scale the samples of --pixels by a power of two so that viewers show them; programs of this toolchain undo it to the bit.
+    /// Variances stand apart, in a second part
+    #[arg(long, requires = "pixels")]
+    viewable: bool,
     /// Draw the region as an SVG or PNG file: histogram with the predicted law over it, means of columns and rows with the predicted
     /// band of one standard deviation, autocorrelation beside the predicted, of XYZ chromaticities with the ellipses of the measured
     /// and of the predicted covariance
@@ -123,6 +127,13 @@ impl Measurement {
             level: self.check.then_some(self.level),
         };
         self.over.map(|Over::Frames| SharedFrames(Mutex::new(OverFrames::new(settings))))
+    }
+
+    /// Where and how the frame of means and variances is written, where one is asked for.
+    pub fn pixels_output(&self) -> Option<Output> {
+        let output =
+            |path: &PathBuf| Output { output: Some(path.clone()), viewable: self.viewable, ..Output::default() };
+        self.pixels.as_ref().map(output)
     }
 
     /// The input of a frame: where it is drawn into a file, no bytes but frames may come behind.

@@ -73,9 +73,9 @@ impl Adapting {
 pub struct XyzSettings {
     /// The space.
     pub space: Space,
-    /// The white of L*a*b*, L*u*v* and sRGB.
-    pub white: White,
-    /// Luminance of a white that is given by its chromaticity, cd m⁻²; by default that which the frame records.
+    /// The white of L*a*b*, L*u*v* and sRGB; by default that which the frame records, or D65.
+    pub white: Option<White>,
+    /// Luminance of a white that is not given as XYZ, cd m⁻²; by default that which the frame records.
     pub white_luminance: Option<f64>,
     /// The adaptation that comes first.
     pub adapting: Option<Adapting>,
@@ -180,7 +180,7 @@ impl FromXyz {
 impl XyzSettings {
     /// Whether a white is asked for, be it for spaces whose numbers do not hang on it: it is recorded, and `--viewable` scales by it.
     fn names_white(&self) -> bool {
-        self.white != White::D65 || self.white_luminance.is_some()
+        self.white.is_some() || self.white_luminance.is_some()
     }
 }
 
@@ -195,12 +195,15 @@ fn reference_white(input: &FrameHeader, settings: &XyzSettings) -> Result<[f64; 
         }
         return Err(input.refuse(problem).leave_out(&["white_luminance"]));
     }
-    let recorded = || metadata.color.as_ref().and_then(|color| color.white).map(|white| white[1]);
-    let luminance = settings.white_luminance.or_else(|| if is_relative { Some(1.0) } else { recorded() });
-    match (settings.white, luminance) {
-        (White::Absolute(white), _) => Ok(white),
-        (white, Some(luminance)) => Ok(white.xyz(luminance)),
-        (white, None) if !needs_white(settings.space) && !settings.names_white() => Ok(white.xyz(1.0)),
+    let recorded = metadata.color.as_ref().and_then(|color| color.white);
+    let of_frame = || if is_relative { Some(1.0) } else { recorded.map(|white| white[1]) };
+    let named = settings.white.unwrap_or_default();
+    match (settings.white, recorded, settings.white_luminance.or_else(of_frame)) {
+        (Some(White::Absolute(white)), ..) => Ok(white),
+        (None, Some(white), _) if settings.white_luminance.is_none() => Ok(white),
+        (None, Some(white), Some(luminance)) => Ok(white.map(|value| value * luminance / white[1])),
+        (.., Some(luminance)) => Ok(named.xyz(luminance)),
+        _ if !needs_white(settings.space) && !settings.names_white() => Ok(named.xyz(1.0)),
         _ => {
             let problem = "nothing tells how bright white is in it";
             Err(input.refuse(problem).give(&["white_luminance"]))
@@ -275,7 +278,7 @@ mod tests {
 
     fn settings(space: Space) -> XyzSettings {
         let locus = Some(Arc::new(Locus::new(&load_observer().unwrap())));
-        XyzSettings { space, white: White::D65, white_luminance: Some(100.0), adapting: None, locus }
+        XyzSettings { space, white: Some(White::D65), white_luminance: Some(100.0), adapting: None, locus }
     }
 
     /// One pixel of XYZ with covariances.
@@ -364,8 +367,11 @@ mod tests {
         let frame = pixel([1.0; 3], None);
         let said = |settings: XyzSettings| FromXyz::new(&frame.header, &settings).unwrap_err().to_string();
         assert!(said(XyzSettings { white_luminance: None, ..settings(Space::Lab) }).contains("how bright white is"));
-        assert!(FromXyz::new(&frame.header, &XyzSettings { white_luminance: None, ..settings(Space::Xyy) }).is_ok());
-        let white = White::Absolute([1.0, 0.0, 1.0]);
+        assert!(
+            FromXyz::new(&frame.header, &XyzSettings { white: None, white_luminance: None, ..settings(Space::Xyy) })
+                .is_ok()
+        );
+        let white = Some(White::Absolute([1.0, 0.0, 1.0]));
         assert!(said(XyzSettings { white, ..settings(Space::Luv) }).contains("is impossible"));
         let mut relative = frame.header.clone();
         relative.metadata.unit = RELATIVE_UNIT.into();

@@ -158,7 +158,7 @@ impl Fitting<'_> {
                 method: None,
                 residual: None,
                 space: Space::Lab,
-                white: self.fit.white.white,
+                white: self.fit.white.or_daylight(),
                 white_luminance: self.fit.white.white_luminance,
             },
             patch: (!self.fit.noise_free).then_some(self.fit.patch),
@@ -169,7 +169,7 @@ impl Fitting<'_> {
 
     /// The white of L\*a\*b\*, in words.
     pub(super) fn white_in_words(&self) -> String {
-        let name = match self.fit.white.white {
+        let name = match self.fit.white.or_daylight() {
             White::Absolute([x, y, z]) => return format!("XYZ {x} {y} {z}"),
             White::D65 => "D65",
             White::D50 => "D50",

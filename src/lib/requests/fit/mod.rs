@@ -221,7 +221,7 @@ mod tests {
         let train = Some(TrainingChoice::Count(12));
         assert!(complaint(Fit { train, ..untrained }).contains("has no training samples"));
         assert!(complaint(Fit { white_sample: Some(3), ..without_urban() }).contains("keeps no sample exact"));
-        let white = WhiteChoice { white: White::Absolute([1.0, 0.0, 1.0]), white_luminance: None };
+        let white = WhiteChoice { white: Some(White::Absolute([1.0, 0.0, 1.0])), white_luminance: None };
         assert!(complaint(Fit { white, ..without_urban() }).contains("is impossible"));
     }
 }

@@ -163,7 +163,7 @@ impl Fit {
     /// Refuses a white that cannot be.
     pub(super) fn check_white(&self) -> Result<()> {
         self.white.check()?;
-        match self.white.white {
+        match self.white.or_daylight() {
             White::Absolute(white) if !white.iter().all(|value| *value > 0.0) => {
                 let [x, y, z] = white;
                 Err(Error::Usage(format!("a white of XYZ {x} {y} {z} is impossible; all three must be above 0")))

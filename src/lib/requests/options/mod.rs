@@ -26,9 +26,9 @@ pub(super) fn defaults<R: Args>(words: &[OsString]) -> R {
 /// The white that colors refer to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub struct WhiteChoice {
-    /// White of L*a*b*: d65, d50, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative by a matrix that says so
-    #[arg(long, default_value_t, value_name = "d65|d50|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
-    pub white: White,
+    /// White of L*a*b*: d65 by default, d50, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative by a matrix that says so
+    #[arg(long, value_name = "d65|d50|e|X,Y,Z", value_parser = values::white, allow_hyphen_values = true)]
+    pub white: Option<White>,
     /// Luminance of the white d65, d50 or e in cd/m2; by default that at which the camera saturates
     #[arg(long, value_name = "CD_PER_M2", value_parser = values::positive)]
     pub white_luminance: Option<f64>,
@@ -42,10 +42,15 @@ impl WhiteChoice {
     /// [`Error::Usage`].
     pub fn check(&self) -> Result<()> {
         match self.white {
-            White::Absolute(_) if self.white_luminance.is_some() => {
+            Some(White::Absolute(_)) if self.white_luminance.is_some() => {
                 Err(Error::Usage("a white of X,Y,Z has its luminance already".into()).leave_out(&["white_luminance"]))
             }
             _ => Ok(()),
         }
+    }
+
+    /// The white that is given, or D65.
+    pub fn or_daylight(&self) -> White {
+        self.white.unwrap_or_default()
     }
 }

@@ -373,14 +373,14 @@ impl NoisePrediction {
         }
         let doubts = matrix.doubt_of_sensor(sensor).into_iter().chain(matrix.doubts_of_codes(&codes_of(sensor)));
         notes.extend(doubts.map(|doubt| Note::Warning(format!("{} {doubt}", path.display()))));
-        notes.extend(doubt_of_white(self.white.white, matrix.is_relative()));
+        notes.extend(doubt_of_white(self.white.or_daylight(), matrix.is_relative()));
         Ok(Some(ColorSettings {
             is_relative: matrix.is_relative(),
             xyz_from_camera: matrix.xyz_from_camera,
             residual: matrix.residual(),
             method: matrix.method,
             space: Space::Xyz,
-            white: self.white.white,
+            white: self.white.or_daylight(),
             white_luminance: self.white.white_luminance,
         }))
     }
