@@ -34,7 +34,7 @@ pub(super) fn describe(
     tags::AS_SHOT_NEUTRAL.numbers(file, &image.first, 4)?;
     let mut metadata = Metadata::new(QuantityKind::Adu);
     metadata.cfa = Some(if image.is_monochrome { FilterArray::Monochrome } else { filters(file, image, active)? });
-    metadata.black_level_adu = Some(levels.black);
+    metadata.black_level_adu = levels.black;
     metadata.black_by_row.clone_from(&levels.black_by_row);
     metadata.black_by_column.clone_from(&levels.black_by_column);
     metadata.white_level_adu = Some(levels.white.into());

@@ -100,7 +100,8 @@ impl DngReader {
         if let Some(doubt) = describe::doubt_of_black(&image, active).filter(|_| !is_ours) {
             register::doubt(format!("{name}: {doubt}"));
         }
-        describe::doubt_of_place(&image).into_iter().for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
+        let doubts = describe::doubt_of_place(&image).into_iter().chain(levels.doubt_of_black());
+        doubts.for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
         // Codes in JPEG have as many bits as that says, whatever the tag.
         let is_jpeg = matches!(storage.compression, Compression::LosslessJpeg { .. });
         if let Some(doubt) = levels.doubt_of_white(storage.sample).filter(|_| !is_ours && !is_jpeg) {
