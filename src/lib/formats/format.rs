@@ -58,6 +58,12 @@ pub trait SampleReader: Send {
         None
     }
 
+    /// From which share of the range between black and white on, and from which sample, the file says that samples may be far from linear
+    /// in light; none where it says so of none.
+    fn linear_limit(&self) -> Option<(f64, f64)> {
+        None
+    }
+
     /// Appends the next `rows` rows, laid out as `[row][channel][column]`; the values are those stored, integers not
     /// scaled. Rows beyond the last must not be asked for.
     ///

@@ -54,9 +54,8 @@ pub(super) fn describe(
     if levels.table.is_some() {
         notes.push("samples are made linear by its LinearizationTable".into());
     }
-    metadata.orientation = told_orientation(tags::ORIENTATION.one(file, &image.first)?, notes);
-    for tag in tags::OPCODES.into_iter().filter(|tag| tag.is_in(image.directory())) {
-        notes.push(format!("its {}, corrections that converters make, is not applied", tag.1));
+    if let Some((share, level)) = levels.linear() {
+        notes.push(format!("above {level} ADU its samples may be far from linear (LinearResponseLimit {share})"));
     }
     Ok(metadata)
 }

@@ -53,6 +53,8 @@ pub struct DngReader {
     storage: Storage,
     /// Linear values of stored ones.
     table: Option<Vec<f32>>,
+    /// From which share of the range on, and from which sample, they may be far from linear.
+    linear: Option<(f64, f64)>,
     area: Rectangle,
     geometry: Geometry,
     own_tags: Metadata,
@@ -119,6 +121,7 @@ impl DngReader {
         Ok(Self {
             file,
             storage,
+            linear: levels.linear(),
             table: levels.table,
             area,
             geometry,
@@ -286,6 +289,10 @@ impl SampleReader for DngReader {
 
     fn noise_profile(&self) -> Option<&NoiseProfile> {
         self.noise_profile.as_ref()
+    }
+
+    fn linear_limit(&self) -> Option<(f64, f64)> {
+        self.linear
     }
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {

@@ -7,6 +7,7 @@ mod codes;
 mod described;
 mod kept;
 mod levels;
+mod linear;
 mod masked;
 mod metadata;
 mod opening;
@@ -452,6 +453,7 @@ impl RowSource for FrameReader {
         if !self.has_begun {
             self.has_begun = true;
             let is_tagged = self.header.metadata.time_s() == self.reader.own_tags().time_s();
+            self.checks.linear_limit = self.reader.linear_limit();
             self.checks.begin(&self.header, self.mask.is_some(), self.linearize.is_none(), is_tagged);
             self.pass_over(self.corner[1], &mut buffer)?;
         }
