@@ -13,6 +13,7 @@ mod illuminants;
 mod image;
 mod levels;
 mod noise;
+mod opcodes;
 mod preview;
 mod ratio;
 mod read;

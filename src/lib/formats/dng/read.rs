@@ -5,6 +5,7 @@ use super::describe;
 use super::image::RawImage;
 use super::levels::Levels;
 use super::noise;
+use super::opcodes::Said as Opcodes;
 use super::samples::ChunkRows;
 use super::storage::{Compression, Storage};
 use super::tags;
@@ -102,8 +103,11 @@ impl DngReader {
         if let Some(doubt) = describe::doubt_of_black(&image, active).filter(|_| !is_ours) {
             register::doubt(format!("{name}: {doubt}"));
         }
-        let doubts = describe::doubt_of_place(&image).into_iter().chain(levels.doubt_of_black());
-        doubts.for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
+        let opcodes = Opcodes::of(&mut file, &image)?;
+        notes.extend(opcodes.notes);
+        let doubts = describe::doubt_of_place(&image).into_iter().chain(opcodes.doubts).chain(levels.doubt_of_black());
+        let of_noise = describe::doubt_of_noise(&mut file, &image)?;
+        doubts.chain(of_noise).for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
         // Codes in JPEG have as many bits as that says, whatever the tag.
         let is_jpeg = matches!(storage.compression, Compression::LosslessJpeg { .. });
         if let Some(doubt) = levels.doubt_of_white(storage.sample).filter(|_| !is_ours && !is_jpeg) {
