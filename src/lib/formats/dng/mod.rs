@@ -34,5 +34,6 @@ pub use color::{OwnMatrix, own_matrix};
 pub(super) use describe::exposure_of;
 pub(super) use illuminants::temperature_k;
 pub use read::{DngReader, FORMAT};
-pub(super) use tell::of_exposure;
+pub(super) use signals::are_other_colors;
+pub(super) use tell::{of_exposure, written_white};
 pub use write::{DngWriter, check_frame};
