@@ -400,3 +400,27 @@ fn integers_that_single_precision_makes_alike_are_told() {
         assert!(!shop.said(&format!("measure {name}"), 0).contains("more digits"), "{name}");
     }
 }
+
+/// Flats through another filter than the frame are told, dark frames through any are not; exposures of a scene through two are no scene.
+#[test]
+fn flats_through_another_filter_are_told() {
+    let shop = Workshop::new();
+    let line = "correct-frame light.fits --dark dark.fits --flat flat.fits --flat-dark dark.fits -o out.exr";
+    let told = "flat.fits: it was taken through the filter `R`, and light.fits through `V`";
+    for (light, flat, is_told) in
+        [("'V'", "'R'", true), ("'V'", "'v '", false), ("''", "'R'", false), ("'V'", "''", false)]
+    {
+        write(&shop, "light.fits", [900, 1], &[("INSTRUME", "'A'"), ("FILTER", light)]);
+        write(&shop, "dark.fits", [100, 2], &[DARK, ("INSTRUME", "'A'"), ("FILTER", "'B'")]);
+        write(&shop, "flat.fits", [2000, 3], &[("INSTRUME", "'A'"), ("IMAGETYP", "'Flat'"), ("FILTER", flat)]);
+        let said = shop.said(line, 0);
+        assert_eq!(said.contains(told), is_told, "{light} {flat}: {said}");
+        assert!(is_told || !said.contains("filter"), "{said}");
+    }
+    write(&shop, "other.fits", [100, 5], &[DARK, ("INSTRUME", "'A'"), ("FILTER", "'V'")]);
+    assert!(!shop.said("average-frames dark.fits other.fits -o mean.exr", 0).contains("filter"));
+    write(&shop, "light.fits", [900, 1], &[("FILTER", "'V'")]);
+    write(&shop, "other.fits", [900, 5], &[("FILTER", "'R'")]);
+    let said = shop.said("average-frames light.fits other.fits -o mean.exr", BAD_DATA);
+    assert!(said.contains("`camera_settings.filter` is R, but that of light.fits is V"), "{said}");
+}

@@ -325,6 +325,11 @@ fn note_settings(header: &Header, notes: &mut Vec<String>) {
         notes.push(format!(
             "its header tells how the camera was set, which no number hangs on here, but frames of other settings are told by: {}",
             found.join(", ")
+        filter: header
+            .text("FILTER")
+            .map(str::trim)
+            .filter(|name| !name.is_empty())
+            .map(|name| visible(name).into_owned()),
         ));
     }
     for key in ["PEDESTAL", "OFFSET", "BLKLEVEL"] {

@@ -429,6 +429,8 @@ fn keywords_of_the_camera_are_used_or_told() {
     let readout_mode = Some("High Gain Mode".to_owned());
     let settings = CameraSettings { offset: Some(21.0), readout_mode, ..CameraSettings::default() };
     assert_eq!(metadata.camera_settings, Some(settings));
+    let filter = |name: &str| told(&[("FILTER", text(name))]).0.camera_settings.and_then(|settings| settings.filter);
+    assert_eq!([filter("Ha"), filter("  ")], [Some("Ha".to_owned()), None]);
     assert_eq!(told(&[("EGAIN", number(-1.0))]).0.camera_settings, None);
     assert_eq!(told(&[("CCD-TEMP", number(-999.0))]).0.sensor_temperature_k, None);
     assert_eq!(

@@ -87,6 +87,7 @@ impl<S: RowSource> FlatFrames<S> {
                 return Err(head.refuse("no light fell on it; a flat field is lit evenly"));
             }
         }
+        warnings.extend(flats.iter().find_map(|flat| doubt_of_filter(frame, flat.header())));
         let is_even = |flat: &S| flat.header().metadata.scene.as_ref().is_some_and(|scene| scene.uniform);
         let mut head = first.header().clone();
         head.metadata.bloomed_photosites =
@@ -380,6 +381,17 @@ impl<S: RowSource> FlatFrames<S> {
         }
     }
 }
+/// A warning of a flat through another filter than `frame`, as far as both tell it.
+fn doubt_of_filter(frame: &FrameHeader, flat: &FrameHeader) -> Option<String> {
+    let settings = flat.metadata.camera_settings.as_ref().zip(frame.metadata.camera_settings.as_ref());
+    let [its, theirs] = settings.and_then(|(flat, frame)| flat.other_filter(frame))?;
+    Some(format!(
+        "{}: it was taken through the filter `{its}`, and {} through `{theirs}`: dust and the responses of photosites to its light are others; \
+         give flats through the same filter",
+        flat.name, frame.name
+    ))
+}
+
 
 /// The head of flats whose metadata name no sensor with that of the frame that they are for, where both were taken with the same settings:
 /// what a user names counts for both.
