@@ -429,6 +429,10 @@ fn keywords_of_the_camera_are_used_or_told() {
     let readout_mode = Some("High Gain Mode".to_owned());
     let settings = CameraSettings { offset: Some(21.0), readout_mode, ..CameraSettings::default() };
     assert_eq!(metadata.camera_settings, Some(settings));
+    let saturate =
+        |unit: &str, level: f64| told(&[("BUNIT", text(unit)), ("SATURATE", number(level))]).0.white_level_adu;
+    assert_eq!(saturate("ADU", 65_000.0), Some(65_000.0.into()));
+    assert_eq!([saturate("ADU", 0.0), saturate("electron", 65_000.0)], [None; 2]);
     let filter = |name: &str| told(&[("FILTER", text(name))]).0.camera_settings.and_then(|settings| settings.filter);
     assert_eq!([filter("Ha"), filter("  ")], [Some("Ha".to_owned()), None]);
     assert_eq!(told(&[("EGAIN", number(-1.0))]).0.camera_settings, None);
