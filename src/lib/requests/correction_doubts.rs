@@ -12,6 +12,9 @@ const LEAST_LOST: f64 = 1e-3;
 
 /// A warning of limits, in standard deviations, that mark so many ordinary photosites that variances fall short.
 pub(super) fn doubt_of_limits(beyond: f64) -> Option<String> {
+/// Less is beneath what black levels are told to, ADU.
+pub(super) const LEAST_EXCESS_ADU: f64 = 0.02;
+
     let [share, variance] = lost_beyond(beyond);
     (variance > LEAST_LOST).then(|| {
         format!(
@@ -68,7 +71,7 @@ pub(super) fn doubt_of_cut_off(cut: &CutOff, left_adu: f64) -> Option<String> {
     const LEAST_ADU: f64 = 0.02;
     const LEAST_SHARE: f64 = 0.005;
     let CutOff { name, share, excess_adu } = cut;
-    (*excess_adu > LEAST_ADU.max(LEAST_SHARE * left_adu)).then(|| {
+    (*excess_adu > LEAST_EXCESS_ADU.max(LEAST_SHARE * left_adu)).then(|| {
         format!(
             "{name}: {} % of the samples of these dark or bias frames are 0, where codes are cut off; as far as they are normal their mean is \
              {excess_adu:.2} ADU too high, and what they come off, {left_adu:.2} ADU on average, is too low by as much; have the camera add an offset, \
