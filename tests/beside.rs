@@ -6,6 +6,7 @@
 use crate::support;
 use cyanometer::frame::to_sample;
 use std::fs;
+use support::dng::dng;
 use support::fits::{chance, write_fits, write_sensor};
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
@@ -633,5 +634,32 @@ fn averages_of_dark_frames_that_are_cut_off_tell_it() {
             assert!((a - b).abs() < 0.1 * b, "{a} {b}");
             assert!((record.unwrap().excess_adu - a).abs() < 0.006, "{record:?} {a}");
         }
+    }
+}
+
+/// Dark frames of 8 bits beside a frame of 16, of which nothing tells the scale; beside a frame that 8 bits hold, or in 16 bits, they are
+/// nothing to speak of.
+#[test]
+fn dark_frames_of_8_bits_beside_a_frame_of_16_are_told() {
+    let shop = Workshop::new();
+    let plane = |name: &str, bits: u32, level: u32| {
+        let code = |at: u32| level + at * 7919 % 13;
+        let bytes = (0..32 * 24).flat_map(|at| code(at).to_le_bytes()[..bits as usize / 8].to_vec());
+        fs::write(shop.path(name), dng([32, 24], bits, 1, &bytes.collect::<Vec<u8>>(), &[])).unwrap();
+        // No DNG any more: a TIFF without levels.
+        let mut bytes = shop.bytes(name);
+        let at = bytes.windows(2).position(|two| two == 50706_u16.to_le_bytes()).unwrap();
+        bytes[at..at + 2].copy_from_slice(&65000_u16.to_le_bytes());
+        fs::write(shop.path(name), bytes).unwrap();
+    };
+    let told = "dark.tif: it is stored in 8 bits, and what it comes off averages";
+    for (light, bits, is_told) in [(2000, 8, true), (2000, 16, false), (180, 8, false)] {
+        plane("light.tif", 16, light);
+        plane("dark.tif", bits, 20);
+        let said = shop.said("correct-frame light.tif --dark dark.tif -o out.exr", 0);
+        assert_eq!(said.contains(told), is_told, "{light} {bits}: {said}");
+        plane("flat.tif", 16, light + 40);
+        let said = shop.said("correct-frame light.tif --black 20 --flat flat.tif --flat-dark dark.tif -o out.exr", 0);
+        assert_eq!(said.contains(told), is_told, "{light} {bits}: {said}");
     }
 }
