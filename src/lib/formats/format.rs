@@ -45,6 +45,11 @@ pub trait SampleReader: Send {
     /// are found, they stand in.
     fn own_tags(&self) -> &Metadata;
 
+    /// Which part of the frame is the picture, X, Y, width and height, and what of the file says so; none where all of it is.
+    fn picture(&self) -> Option<(&'static str, [i64; 4])> {
+        None
+    }
+
     /// What the format's own tags say of the colors of R, G and B.
     fn colors(&self) -> ColorTags {
         ColorTags::default()

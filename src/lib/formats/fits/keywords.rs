@@ -26,6 +26,8 @@ pub(super) struct Told {
     pub metadata: Metadata,
     /// The first row of the array is the lowest of the picture.
     pub is_bottom_up: bool,
+    /// The part that is the picture, where it is not all, and the keyword that tells it.
+    pub picture: Option<(&'static str, [i64; 4])>,
     /// What was passed over, and why.
     pub notes: Vec<String>,
     /// What contradicts itself.
@@ -66,7 +68,7 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     });
     note_settings(header, &mut notes);
     doubts.extend(doubt_of_stack(header));
-    Told { metadata, is_bottom_up: first_row == FirstRow::Bottom, notes, doubts }
+    Told { metadata, is_bottom_up: first_row == FirstRow::Bottom, picture: None, notes, doubts }
 }
 
 /// The code from which on samples are saturated, by `SATURATE`, of integers that may be codes.

@@ -429,12 +429,6 @@ fn keywords_of_the_camera_are_used_or_told() {
     let readout_mode = Some("High Gain Mode".to_owned());
     let settings = CameraSettings { offset: Some(21.0), readout_mode, ..CameraSettings::default() };
     assert_eq!(metadata.camera_settings, Some(settings));
-    let saturate =
-        |unit: &str, level: f64| told(&[("BUNIT", text(unit)), ("SATURATE", number(level))]).0.white_level_adu;
-    assert_eq!(saturate("ADU", 65_000.0), Some(65_000.0.into()));
-    assert_eq!([saturate("ADU", 0.0), saturate("electron", 65_000.0)], [None; 2]);
-    let filter = |name: &str| told(&[("FILTER", text(name))]).0.camera_settings.and_then(|settings| settings.filter);
-    assert_eq!([filter("Ha"), filter("  ")], [Some("Ha".to_owned()), None]);
     assert_eq!(told(&[("EGAIN", number(-1.0))]).0.camera_settings, None);
     assert_eq!(told(&[("CCD-TEMP", number(-999.0))]).0.sensor_temperature_k, None);
     assert_eq!(
@@ -460,6 +454,18 @@ fn keywords_of_the_camera_are_used_or_told() {
     }
     let (metadata, _) = told(&[("BUNIT", text("MJy/sr")), ("BAYERPAT", text("RGGB"))]);
     assert_eq!((metadata.quantity, metadata.unit.as_str()), (QuantityKind::Unspecified, "MJy/sr"));
+}
+
+/// Filters by their names, and the white level of codes alone.
+#[test]
+fn filters_and_saturation_are_told() {
+    let told = |cards: &[(&str, Value)]| keywords::read(&Header::of(cards), 1, true).metadata;
+    let saturate =
+        |unit: &str, level: f64| told(&[("BUNIT", text(unit)), ("SATURATE", Value::Number(level))]).white_level_adu;
+    assert_eq!(saturate("ADU", 65_000.0), Some(65_000.0.into()));
+    assert_eq!([saturate("ADU", 0.0), saturate("electron", 65_000.0)], [None; 2]);
+    let filter = |name: &str| told(&[("FILTER", text(name))]).camera_settings.and_then(|settings| settings.filter);
+    assert_eq!([filter("Ha"), filter("  ")], [Some("Ha".to_owned()), None]);
 }
 
 #[test]
