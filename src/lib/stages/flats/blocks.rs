@@ -90,14 +90,15 @@ mod tests {
         let geometry = Geometry { origin: [10, 20], ..Geometry::new(48, 32, &["plane"]) };
         let mut blocks = Blocks::of(&geometry, 2);
         for y in 0..32 {
-            let level = |x: usize| [100.0, 700.0][(x + y) % 2] * if x < 16 { 0.5 } else { 1.25 };
+            let light = if y < 8 { 1.0 } else { 1.5 };
+            let level = |x: usize| [100.0, 700.0][(x + y) % 2] * if x < 16 { 0.5 } else { 1.25 } * light;
             let row: Vec<f64> = (0..48).map(level).collect();
             let whole: Vec<bool> = (0..24).map(|cell| cell < 16 || y < 16).collect();
             blocks.take_row(y, 2, &row, &whole, &[y % 2, (y + 1) % 2]);
         }
         let light = blocks.illumination(&[100.0, 700.0]);
         assert_eq!(blocks.sums.iter().map(|(_, count)| count).sum::<f64>(), f64::from(32 * 32 + 16 * 16));
-        let shares = (0..24).map(|block| if block % 6 < 2 { 0.5 } else { 1.25 });
+        let shares = (0..24).map(|block| if block % 6 < 2 { 0.5 } else { 1.25 } * if block < 6 { 1.0 } else { 1.5 });
         let wanted = Illumination::new([10, 20, 48, 32], [6, 4], shares.collect());
         assert_eq!(light, wanted);
     }
