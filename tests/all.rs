@@ -12,6 +12,7 @@ mod corpus;
 mod correction;
 mod corrections;
 mod described;
+mod dng;
 mod doubts;
 mod ends;
 mod everyday;

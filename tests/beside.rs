@@ -6,6 +6,7 @@
 use crate::support;
 use cyanometer::frame::to_sample;
 use std::fs;
+use support::dng::dng;
 use support::fits::{chance, write_fits, write_sensor};
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
@@ -591,4 +592,74 @@ fn frames_of_another_scale_are_not_averaged_without_a_word() {
     }
     frame("b.fits", 1.0 / 16384.0, 500.0, 2);
     assert!(shop.said("average-frames a.fits b.fits -o out.exr", 0).contains("are some shares of 1"));
+}
+
+/// Dark frames whose bias is below their noise, averaged first: the average tells what its codes lost, which is what the frames tell one by
+/// one. Those of a bias that is high enough tell nothing.
+#[test]
+fn averages_of_dark_frames_that_are_cut_off_tell_it() {
+    let shop = Workshop::new();
+    for (bias, is_cut) in [(2.0, true), (60.0, false)] {
+        write_fits(&shop, "light.fits", SIZE, &[("INSTRUME", "'A'")], |x, y| bias + 40.0 + 12.0 * chance(x, y, 90));
+        for seed in 0..4_u32 {
+            let name = format!("dark{seed}.fits");
+            write_fits(&shop, &name, SIZE, &[("INSTRUME", "'A'"), DARK], |x, y| {
+                let sum: f64 = (0..6).map(|part| chance(x, y, u64::from(10 * seed + part))).sum();
+                bias + 5.0 * sum
+            });
+        }
+        let (files, told) = ("dark0.fits dark1.fits dark2.fits dark3.fits", "are 0, where codes are cut off");
+        for combine in ["mean", "median", "clipped"] {
+            let said = shop.said(&format!("average-frames {files} --combine {combine} -o mean.exr"), 0);
+            assert_eq!(
+                said.contains(told) && said.contains("have the camera add an offset"),
+                is_cut,
+                "{combine}: {said}"
+            );
+        }
+        let said = shop.said(&format!("average-frames {files} -o mean.exr"), 0);
+        let record = shop.sidecar("mean.exr").average.unwrap().cut_off;
+        assert_eq!(record.is_some(), is_cut, "{said}");
+        let excess = |said: &str| -> f64 {
+            let before = said.split(" ADU too high").next().unwrap();
+            before.rsplit(' ').next().unwrap().parse().unwrap()
+        };
+        let by_mean = shop.said("correct-frame light.fits --dark mean.exr -o out.exr", 0);
+        let darks = files.replace("dark", "--dark dark");
+        let one_by_one = shop.said(&format!("correct-frame light.fits {darks} -o out.exr"), 0);
+        assert_eq!([&by_mean, &one_by_one].map(|said| said.contains(told)), [is_cut; 2], "{by_mean} {one_by_one}");
+        if is_cut {
+            // Told to two digits of the same codes, of which an average looks at some rows.
+            let [a, b] = [&by_mean, &one_by_one].map(|said| excess(said));
+            assert!((a - b).abs() < 0.1 * b, "{a} {b}");
+            assert!((record.unwrap().excess_adu - a).abs() < 0.006, "{record:?} {a}");
+        }
+    }
+}
+
+/// Dark frames of 8 bits beside a frame of 16, of which nothing tells the scale; beside a frame that 8 bits hold, or in 16 bits, they are
+/// nothing to speak of.
+#[test]
+fn dark_frames_of_8_bits_beside_a_frame_of_16_are_told() {
+    let shop = Workshop::new();
+    let plane = |name: &str, bits: u32, level: u32| {
+        let code = |at: u32| level + at * 7919 % 13;
+        let bytes = (0..32 * 24).flat_map(|at| code(at).to_le_bytes()[..bits as usize / 8].to_vec());
+        fs::write(shop.path(name), dng([32, 24], bits, 1, &bytes.collect::<Vec<u8>>(), &[])).unwrap();
+        // No DNG any more: a TIFF without levels.
+        let mut bytes = shop.bytes(name);
+        let at = bytes.windows(2).position(|two| two == 50706_u16.to_le_bytes()).unwrap();
+        bytes[at..at + 2].copy_from_slice(&65000_u16.to_le_bytes());
+        fs::write(shop.path(name), bytes).unwrap();
+    };
+    let told = "dark.tif: it is stored in 8 bits, and what it comes off averages";
+    for (light, bits, is_told) in [(2000, 8, true), (2000, 16, false), (180, 8, false)] {
+        plane("light.tif", 16, light);
+        plane("dark.tif", bits, 20);
+        let said = shop.said("correct-frame light.tif --dark dark.tif -o out.exr", 0);
+        assert_eq!(said.contains(told), is_told, "{light} {bits}: {said}");
+        plane("flat.tif", 16, light + 40);
+        let said = shop.said("correct-frame light.tif --black 20 --flat flat.tif --flat-dark dark.tif -o out.exr", 0);
+        assert_eq!(said.contains(told), is_told, "{light} {bits}: {said}");
+    }
 }

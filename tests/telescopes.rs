@@ -400,3 +400,48 @@ fn integers_that_single_precision_makes_alike_are_told() {
         assert!(!shop.said(&format!("measure {name}"), 0).contains("more digits"), "{name}");
     }
 }
+
+/// Flats through another filter than the frame are told, dark frames through any are not; exposures of a scene through two are no scene.
+#[test]
+fn flats_through_another_filter_are_told() {
+    let shop = Workshop::new();
+    let line = "correct-frame light.fits --dark dark.fits --flat flat.fits --flat-dark dark.fits -o out.exr";
+    let told = "flat.fits: it was taken through the filter `R`, and light.fits through `V`";
+    for (light, flat, is_told) in
+        [("'V'", "'R'", true), ("'V'", "'v '", false), ("''", "'R'", false), ("'V'", "''", false)]
+    {
+        write(&shop, "light.fits", [900, 1], &[("INSTRUME", "'A'"), ("FILTER", light)]);
+        write(&shop, "dark.fits", [100, 2], &[DARK, ("INSTRUME", "'A'"), ("FILTER", "'B'")]);
+        write(&shop, "flat.fits", [2000, 3], &[("INSTRUME", "'A'"), ("IMAGETYP", "'Flat'"), ("FILTER", flat)]);
+        let said = shop.said(line, 0);
+        assert_eq!(said.contains(told), is_told, "{light} {flat}: {said}");
+        assert!(is_told || !said.contains("filter"), "{said}");
+    }
+    write(&shop, "other.fits", [100, 5], &[DARK, ("INSTRUME", "'A'"), ("FILTER", "'V'")]);
+    assert!(!shop.said("average-frames dark.fits other.fits -o mean.exr", 0).contains("filter"));
+    write(&shop, "light.fits", [900, 1], &[("FILTER", "'V'")]);
+    write(&shop, "other.fits", [900, 5], &[("FILTER", "'R'")]);
+    let said = shop.said("average-frames light.fits other.fits -o mean.exr", BAD_DATA);
+    assert!(said.contains("`camera_settings.filter` is R, but that of light.fits is V"), "{said}");
+}
+
+/// Overscan of the frame tells its black level, and what is picture is told with the rectangle that takes it.
+#[test]
+fn overscan_that_a_header_tells_is_the_border() {
+    let shop = Workshop::new();
+    let cards = [("INSTRUME", "'A'"), ("BIASSEC", "'[57:64,1:48]'"), ("DATASEC", "'[1:56,1:48]'")];
+    write_fits(&shop, "light.fits", [64, 48], &cards, |x, y| {
+        let level = if x < 56 { 900 } else { 300 };
+        f64::from(level + (x * 7919 + y * 104_729) % 11)
+    });
+    let said = shop.said("correct-frame light.fits --black border -o out.exr", 0);
+    assert!(
+        said.contains("light.fits: its picture is 56x48 from 0,0 (DATASEC)") && said.contains("--crop 0,0,56,48"),
+        "{said}"
+    );
+    assert_eq!(shop.sidecar("out.exr").masked_areas, [[56, 0, 8, 48]]);
+    let (made, _) = shop.read("out.exr");
+    let border: f64 = made.chunks(64).flat_map(|row| &row[56..64]).map(|left| f64::from(*left)).sum();
+    assert!(border.abs() < 1e-2 && (made[0] - 600.0).abs() < 11.0, "{border} {}", made[0]);
+    assert_eq!(shop.said("measure light.fits --crop 0,0,56,48", 0), "");
+}

@@ -8,9 +8,9 @@ pub fn dng(size: [u32; 2], bits: u32, compression: u32, strip: &[u8], more: &[(u
     written(size, bits, compression, strip, more, &[])
 }
 
-/// The same of samples of 16 bits, where the tags of colors are ratios: numerators and divisors.
+/// The same of samples of 16 bits, where the tags of colors and shares are ratios: numerators and divisors.
 pub fn dng_with_ratios(size: [u32; 2], strip: &[u8], more: &[(u16, &[u32])]) -> Vec<u8> {
-    written(size, 16, 1, strip, more, &[(50721, 10), (50722, 10), (50727, 5), (50728, 5)])
+    written(size, 16, 1, strip, more, &[(50721, 10), (50722, 10), (50727, 5), (50728, 5), (50734, 5), (50935, 5)])
 }
 
 fn written(

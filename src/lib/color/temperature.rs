@@ -57,6 +57,13 @@ pub fn correlated(observer: &Observer, xy: [f64; 2]) -> Correlated {
     Correlated { temperature_k: K_PER_MK / a.midpoint(b), distance: at_a.min(at_b) }
 }
 
+/// The same, in K, with Duv: the distance, above zero where v is larger than the black body's \[Ohno2014].
+pub fn temperature_and_duv(observer: &Observer, xy: [f64; 2]) -> [f64; 2] {
+    let Correlated { temperature_k, distance } = correlated(observer, xy);
+    let [body, own] = [planckian(observer, temperature_k), xy].map(|xy| uv(xy)[1]);
+    [temperature_k, if own < body { -distance } else { distance }]
+}
+
 /// Reciprocal temperatures of the table, MK⁻¹: one apart, 10⁶ K to 1000 K.
 const ENTRIES: usize = 1000;
 

@@ -45,6 +45,11 @@ pub trait SampleReader: Send {
     /// are found, they stand in.
     fn own_tags(&self) -> &Metadata;
 
+    /// Which part of the frame is the picture, X, Y, width and height, and what of the file says so; none where all of it is.
+    fn picture(&self) -> Option<(&'static str, [i64; 4])> {
+        None
+    }
+
     /// What the format's own tags say of the colors of R, G and B.
     fn colors(&self) -> ColorTags {
         ColorTags::default()
@@ -55,6 +60,12 @@ pub trait SampleReader: Send {
 
     /// The noise of the samples, where the file tells it.
     fn noise_profile(&self) -> Option<&NoiseProfile> {
+        None
+    }
+
+    /// From which share of the range between black and white on, and from which sample, the file says that samples may be far from linear
+    /// in light; none where it says so of none.
+    fn linear_limit(&self) -> Option<(f64, f64)> {
         None
     }
 

@@ -1,6 +1,7 @@
 //! Frames that are read in step, however many there are: those that the system does not let be open together are opened for
 //! each band anew.
 
+use super::format::SampleType;
 use super::input::{FrameReader, InputOptions};
 use crate::error::Result;
 use crate::metadata::FrameHeader;
@@ -16,6 +17,7 @@ pub struct OneOfMany {
     natural_rows: usize,
     may_wait: bool,
     notes: Vec<String>,
+    stored_as: Option<SampleType>,
     /// None while the file is closed.
     reader: Option<FrameReader>,
     options: InputOptions,
@@ -48,6 +50,7 @@ impl OneOfMany {
                 natural_rows: reader.natural_rows(),
                 may_wait: reader.may_wait(),
                 notes: reader.notes().to_vec(),
+                stored_as: reader.sample_type(),
                 reader: stays_open.then_some(reader),
                 options,
                 rows_read: 0,
@@ -60,6 +63,11 @@ impl OneOfMany {
     /// Its head, to which what a user says of it may be added.
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
+    }
+
+    /// The type of its stored samples; none where channels differ in it.
+    pub fn stored_as(&self) -> Option<SampleType> {
+        self.stored_as
     }
 
     /// What a careful user should know of it.

@@ -125,6 +125,18 @@ pub struct ExposuresRecord {
     /// What levels differ by, in standard deviations of a sample, where a median or clipped mean is no longer that of samples alike.
     #[serde(default, skip_serializing_if = "is_none_apart")]
     pub unlike_levels: f64,
+    /// How far codes were cut off at 0, where more than next to none was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut_off: Option<CutOffRecord>,
+}
+
+/// Codes that are cut off at 0, of exposures that are averaged.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CutOffRecord {
+    /// The share of them that is 0.
+    pub share: f64,
+    /// What the average is too high by, ADU, as far as codes are of one normal law.
+    pub excess_adu: f64,
 }
 
 impl ExposuresRecord {
@@ -134,7 +146,7 @@ impl ExposuresRecord {
         quantity: QuantityKind,
         demosaicked: bool,
     ) -> Self {
-        Self { frames, combine, clip, quantity, demosaicked, unlike_levels: 0.0 }
+        Self { frames, combine, clip, quantity, demosaicked, unlike_levels: 0.0, cut_off: None }
     }
 
     /// How they were averaged.

@@ -15,8 +15,8 @@ pub use black_noise::BlackNoise;
 pub use capture::{CaptureRecord, FirstRow};
 pub use converter::AdcRecord;
 pub use correction::{
-    AverageRecord, CorrectionRecord, DefectsRecord, DrawnExposures, ExposureSet, ExposuresRecord, FlatRecord,
-    MasterKind, MasterNoise, MasterRecord,
+    AverageRecord, CorrectionRecord, CutOffRecord, DefectsRecord, DrawnExposures, ExposureSet, ExposuresRecord,
+    FlatRecord, MasterKind, MasterNoise, MasterRecord,
 };
 pub use difference::Difference;
 pub use header::FrameHeader;

@@ -188,10 +188,14 @@ pub struct CameraSettings {
     /// Mode of the read-out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub readout_mode: Option<String>,
+    /// Filter before the sensor, by its name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filter: Option<String>,
 }
 
 impl CameraSettings {
-    /// The first setting in which others differ, as far as both tell it: what it is, and what it is here and there.
+    /// The first setting in which others differ, as far as both tell it: what it is, and what it is here and there. What codes mean does
+    /// not hang on the filter, which is none of these.
     pub fn other_than(&self, others: &Self) -> Option<(&'static str, String, String)> {
         let number = |number: Option<f64>| number.map(|number| number.to_string());
         [
@@ -204,6 +208,12 @@ impl CameraSettings {
         .find_map(|(what, here, there)| {
             here.zip(there).filter(|(here, there)| here != there).map(|(here, there)| (what, here, there))
         })
+    }
+
+    /// The names of the filters here and there, where both are told and differ in more than capitals.
+    pub fn other_filter<'a>(&'a self, others: &'a Self) -> Option<[&'a str; 2]> {
+        let (here, there) = self.filter.as_deref().zip(others.filter.as_deref())?;
+        (!here.eq_ignore_ascii_case(there)).then_some([here, there])
     }
 }
 

@@ -27,6 +27,21 @@ impl AtZero {
         if self.count > 0.0 { self.zeros / self.count } else { 0.0 }
     }
 
+    /// Mean and standard deviation of the normal law of such codes, as shares of codes below ½ and 1½ tell them; none where too few codes are
+    /// 0 or 1, or nearly all.
+    pub fn law(&self) -> Option<[f64; 2]> {
+        /// Numbers of ones, and of codes above, that tell a standard deviation to a tenth.
+        const LEAST: f64 = 100.0;
+        let others = self.count - self.zeros - self.ones;
+        if self.zeros < LEAST || self.ones < LEAST || others < LEAST {
+            return None;
+        }
+        let z = |many: f64| -std::f64::consts::SQRT_2 * erfc_inv(2.0 * many / self.count);
+        let below = z(self.zeros);
+        let std = 1.0 / (z(self.zeros + self.ones) - below);
+        Some([0.5 - std * below, std])
+    }
+
     /// By how much the mean is too high, of rounded numbers of a normal law, as shares of codes below ½ and 1½ tell its mean and standard
     /// deviation; of averages that keep such a share of the variance of a code, and are cut off as a code is.
     ///
@@ -43,16 +58,8 @@ impl AtZero {
     /// assert!((codes.excess(1.0).unwrap() - 0.598).abs() < 0.012);
     /// ```
     pub fn excess(&self, kept: f64) -> Option<f64> {
-        /// Numbers of ones, and of codes above, that tell a standard deviation to a tenth.
-        const LEAST: f64 = 100.0;
-        let others = self.count - self.zeros - self.ones;
-        if self.zeros < LEAST || self.ones < LEAST || others < LEAST {
-            return None;
-        }
-        let z = |many: f64| -std::f64::consts::SQRT_2 * erfc_inv(2.0 * many / self.count);
-        let below = z(self.zeros);
-        let std = 1.0 / (z(self.zeros + self.ones) - below);
-        let (mean, std) = (0.5 - std * below, std * kept.sqrt());
+        let [mean, std] = self.law()?;
+        let std = std * kept.sqrt();
         let of = |step: u32| cumulative((-0.5 - f64::from(step) - mean) / std);
         // Beyond 9 standard deviations there is nothing, and what scatters over more codes is an integral.
         let steps = (0..100_000).map(of).take_while(|share| *share > 1e-15);

@@ -1,5 +1,6 @@
 //! The average of exposures of one scene, and what stays uncertain in it.
 
+use super::floor::Floor;
 use super::frame_levels::FrameLevels;
 use super::values;
 use crate::analysis::statistics::{MarkedRows, Saturated};
@@ -7,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::formats::input::FrameReader;
 use crate::formats::stack::FrameStack;
 use crate::frame::to_sample;
-use crate::metadata::{AverageRecord, Coverage, ExposuresRecord, FrameHeader};
+use crate::metadata::{AverageRecord, Coverage, CutOffRecord, ExposuresRecord, FrameHeader};
 use crate::numerics::averages::{CLIP, Combine, Kept, average};
 use crate::numerics::running::Running;
 use crate::sigma::{PixelLayers, is_layer};
@@ -77,6 +78,8 @@ struct Seen {
     /// The first frame by its samples, and a warning of one that is not like it.
     first: FrameLevels,
     unlike: Option<String>,
+    /// How far codes are cut off at 0.
+    floor: Floor,
 }
 
 impl Seen {
@@ -92,7 +95,8 @@ impl Seen {
     }
 
     /// Compares the samples of a frame with those of the first, which it may be.
-    fn compare(&mut self, levels: FrameLevels) {
+    fn compare(&mut self, levels: FrameLevels, before: Option<CutOffRecord>) {
+        self.floor.take(&levels, before);
         if self.samples.frames() < 2 {
             self.first = levels;
         } else if self.unlike.is_none() {
@@ -220,6 +224,7 @@ impl Average {
                     marks,
                     first: FrameLevels::default(),
                     unlike: None,
+                    floor: Floor::default(),
                 })
             }
         };
@@ -249,7 +254,7 @@ impl Average {
             }
             y += count;
         }
-        seen.compare(levels);
+        seen.compare(levels, all.metadata.average.and_then(|average| average.cut_off));
         Ok(())
     }
 }
@@ -285,7 +290,9 @@ impl Averaged {
         metadata.averaged = seen.exposures.drawn();
         let unlike_levels = apart.map_or(0.0, |apart| apart.spread);
         let record = ExposuresRecord::of(record, metadata.quantity, metadata.demosaic.is_some());
-        metadata.average = Some(ExposuresRecord { unlike_levels, ..record });
+        let cut_off = seen.floor.cut_off(&first, own);
+        metadata.average = Some(ExposuresRecord { unlike_levels, cut_off, ..record });
+        warnings.extend(cut_off.and_then(|cut| seen.floor.doubt(&first, cut)));
         /// Codes over which what is averaged scatters, so that rounding counts for nothing.
         const MANY_CODES: f64 = 16.0;
         // Each frame's black level has the noise of its own border, which is averaged as that of the frames.

@@ -1,7 +1,7 @@
 //! Corrections of a frame of codes before demosaicking.
 
 use super::border::measure_black;
-use super::correction_doubts::{doubt_of_cut_off, doubt_of_limits, doubts_of_flats, said_of_levels};
+use super::correction_doubts::{doubt_of_bytes, doubt_of_cut_off, doubt_of_limits, doubts_of_flats, said_of_levels};
 use super::dark_levels::{DarkLevels, doubt_of_dark, doubt_of_one};
 use super::described::{Described, doubt_of_black};
 use super::independence::{Company, Role, check_contents, check_files};
@@ -473,10 +473,19 @@ impl OpenCorrection {
             let (darks, light) = (flats.darks()?, flats.mean()?);
             doubt_of_cut_off(&darks.cut_off()?, light - darks.mean()?)
         });
+        let bytes = darks.as_ref().and_then(|darks| doubt_of_bytes(darks.frames(), darks.means()?[0]));
+        let bytes_of_flats =
+            flats.as_ref().and_then(|(flats, _)| doubt_of_bytes(flats.darks()?.frames(), flats.mean()?));
+        let bytes = bytes.into_iter().chain(bytes_of_flats);
         let of_flats = flats.as_ref().zip(self.levels_of_flats.as_ref());
         let of_flats = of_flats.map_or(Vec::new(), |((flats, _), levels)| levels.doubts_of_flats(flats));
-        let level =
-            level.into_iter().chain(unlike.map(doubt_of_one)).chain(of_flats).chain(cut_off).chain(cut_off_flats);
+        let level = level
+            .into_iter()
+            .chain(unlike.map(doubt_of_one))
+            .chain(of_flats)
+            .chain(cut_off)
+            .chain(cut_off_flats)
+            .chain(bytes);
         let doubt = map.as_ref().and_then(DefectMap::finding).into_iter().chain(level).map(Note::Warning);
         said.into_iter().flatten().map(Note::Remark).chain(doubt).collect()
     }

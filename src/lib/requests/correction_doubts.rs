@@ -1,5 +1,7 @@
 //! What a user should hear of flats, of limits, and of dark frames that are cut off, by which a frame is corrected.
 
+use crate::formats::format::SampleType;
+use crate::formats::many::OneOfMany;
 use crate::metadata::FrameHeader;
 use crate::stages::darks::CutOff;
 use crate::stages::defects::lost_beyond;
@@ -9,6 +11,9 @@ use crate::text::percent_in_decimals;
 
 /// The share of a variance that limits may take unsaid.
 const LEAST_LOST: f64 = 1e-3;
+
+/// Less is beneath what black levels are told to, ADU.
+pub(super) const LEAST_EXCESS_ADU: f64 = 0.02;
 
 /// A warning of limits, in standard deviations, that mark so many ordinary photosites that variances fall short.
 pub(super) fn doubt_of_limits(beyond: f64) -> Option<String> {
@@ -64,11 +69,10 @@ fn doubt_of_noise(name: &str, means: &FlatMeans, frame: &FrameHeader) -> Option<
 
 /// A warning of frames without light whose samples are cut off at code 0, which came off a frame of such a mean beyond.
 pub(super) fn doubt_of_cut_off(cut: &CutOff, left_adu: f64) -> Option<String> {
-    /// Less is beneath what black levels are told to, ADU, or a share of the light that does not show.
-    const LEAST_ADU: f64 = 0.02;
+    /// A share of the light that does not show.
     const LEAST_SHARE: f64 = 0.005;
     let CutOff { name, share, excess_adu } = cut;
-    (*excess_adu > LEAST_ADU.max(LEAST_SHARE * left_adu)).then(|| {
+    (*excess_adu > LEAST_EXCESS_ADU.max(LEAST_SHARE * left_adu)).then(|| {
         format!(
             "{name}: {} % of the samples of these dark or bias frames are 0, where codes are cut off; as far as they are normal their mean is \
              {excess_adu:.2} ADU too high, and what they come off, {left_adu:.2} ADU on average, is too low by as much; have the camera add an offset, \
@@ -76,6 +80,21 @@ pub(super) fn doubt_of_cut_off(cut: &CutOff, left_adu: f64) -> Option<String> {
             percent_in_decimals(*share, 0)
         )
     })
+}
+
+/// A warning of frames without light that are stored in 8 bits, unlike a frame of such a mean that they came off: nothing tells their scale.
+pub(super) fn doubt_of_bytes<'a>(darks: impl IntoIterator<Item = &'a OneOfMany>, light_adu: f64) -> Option<String> {
+    const LARGEST: f64 = 255.0;
+    // White levels that both tell are compared before.
+    let is_small = |dark: &&OneOfMany| {
+        dark.stored_as() == Some(SampleType::U8) && dark.header().metadata.white_level_adu.is_none()
+    };
+    let dark = darks.into_iter().find(is_small).filter(|_| light_adu > LARGEST)?;
+    Some(format!(
+        "{}: it is stored in 8 bits, and what it comes off averages {light_adu:.1} ADU, which 8 bits do not hold: unless its codes were small \
+         enough as they are, its scale is another; take it in the bits of the frame",
+        dark.header().name
+    ))
 }
 
 /// What is said of flats that were brought to one level before their median or clipped mean.

@@ -1,5 +1,6 @@
 //! Whether exposures that are averaged are of one scene and one scale, by their samples.
 
+use crate::numerics::cut_off::AtZero;
 use crate::numerics::steps::Steps;
 
 /// Means of exposures of one scene differ by fewer times, though lamps flicker and clouds pass.
@@ -15,6 +16,9 @@ pub(super) struct FrameLevels {
     sum: f64,
     squares: f64,
     steps: Steps,
+    /// How many samples are 0, and 1; and below zero or no whole numbers.
+    lowest: [f64; 2],
+    no_codes: f64,
 }
 
 impl FrameLevels {
@@ -29,10 +33,19 @@ impl FrameLevels {
             self.count += 1.0;
             self.sum += sample;
             self.squares += sample * sample;
+            self.lowest[0] += f64::from(u8::from(sample == 0.0));
+            self.lowest[1] += f64::from(u8::from(sample == 1.0));
+            self.no_codes += f64::from(u8::from(sample < 0.0 || sample.fract() != 0.0));
         }
         if !self.steps.is_one() {
             self.steps.take(samples.iter().map(|sample| f64::from(*sample)));
         }
+    }
+
+    /// Its sum, and how many of its samples are the lowest codes; none of samples that are no codes as a converter gave them.
+    pub(super) fn lowest_codes(&self) -> Option<(f64, AtZero)> {
+        let [zeros, ones] = self.lowest;
+        (self.no_codes == 0.0).then_some((self.sum, AtZero { count: self.count, zeros, ones }))
     }
 
     fn mean(&self) -> f64 {

@@ -28,6 +28,7 @@ mod correction_doubts;
 mod dark_levels;
 pub mod described;
 pub mod fit;
+mod floor;
 mod frame_levels;
 pub mod independence;
 pub mod measurement;

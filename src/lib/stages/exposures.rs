@@ -1,7 +1,9 @@
 //! Exposures of one scene by one camera: whether frames that come one after another are.
 
 use crate::error::{Error, Result};
-use crate::metadata::{BlackNoise, Difference, DrawnExposures, ExposureSet, FrameHeader, Metadata, SamplesRecord};
+use crate::metadata::{
+    BlackNoise, Difference, DrawnExposures, ExposureSet, FrameHeader, Metadata, SamplesRecord, TakenAs,
+};
 use std::collections::HashMap;
 
 /// What is known of exposures that came so far.
@@ -151,9 +153,12 @@ impl Exposures {
     }
 }
 
-/// What tells more than the exposure: not the level that its own border told.
+/// What tells more than the exposure: not the level that its own border told, and not the filter of what was taken without light.
 fn without_border(frame: &FrameHeader) -> FrameHeader {
     let mut head = frame.without_exposure();
+    if matches!(head.metadata.taken_as, Some(TakenAs::Dark | TakenAs::Bias)) {
+        head.metadata.camera_settings.iter_mut().for_each(|settings| settings.filter = None);
+    }
     if let (Some(noise), Some(correction)) = (&mut head.metadata.black_noise, &mut head.metadata.correction) {
         // By which lines it was told is the same of all.
         *noise = noise.signs();

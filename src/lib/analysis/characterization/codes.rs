@@ -67,6 +67,11 @@ impl CameraMatrix {
         }
         // The offset is part of the black level, which comes off.
         let settings = CameraSettings { e_per_adu: None, offset: None, ..own };
+        if let Some([own, other]) = settings.other_filter(&others) {
+            return Some(format!(
+                "was fitted to a frame through the filter `{own}`, and this one is through `{other}`: XYZ are off as its light is"
+            ));
+        }
         let (what, own, other) = settings.other_than(&others)?;
         Some(format!(
             "was fitted to a frame whose {what} is {own}, and that of this one is {other}: XYZ are off as codes are"
@@ -150,7 +155,7 @@ mod tests {
     #[test]
     fn other_settings_are_told_by_their_factor_where_there_is_one() {
         let set = |gain, e_per_adu, offset| {
-            let settings = CameraSettings { gain: Some(gain), e_per_adu, offset: Some(offset), readout_mode: None };
+            let settings = CameraSettings { gain: Some(gain), e_per_adu, offset: Some(offset), ..Default::default() };
             Metadata { iso_speed: None, camera_settings: Some(settings), ..codes(4000.0) }
         };
         let told = |own: &Metadata, other: &Metadata| fitted(MATRIX_UNIT, own).doubts_of_codes(other).join("; ");

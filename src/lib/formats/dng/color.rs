@@ -57,6 +57,16 @@ fn found(
     image: &RawImage,
     notes: &mut Vec<String>,
 ) -> Result<std::result::Result<RelativeMatrix, String>> {
+    // What is made for a picture is no scene any more.
+    let reference = match tags::COLORIMETRIC_REFERENCE.one(file, &image.first) {
+        Err(Error::Format { .. }) => None,
+        other => other?,
+    };
+    if let Some(reference) = reference.filter(|reference| *reference != 0) {
+        return Ok(Err(format!(
+            "it leads to the colors of a picture, not of the scene (ColorimetricReference {reference})"
+        )));
+    }
     let planes = tags::CFA_PLANE_COLOR.unsigned(file, image.directory(), 16)?;
     if planes.is_some_and(|planes| planes != [0, 1, 2]) {
         return Ok(Err("its classes are others than R, G and B (CFAPlaneColor)".into()));
@@ -76,16 +86,16 @@ fn found(
 
 /// Whether there is a matrix for an illuminant.
 fn has_matrix(image: &RawImage) -> bool {
-    tags::COLOR_MATRICES.iter().any(|tag| tag.is_in(&image.first))
+    let [first, second, _] = tags::COLOR_MATRICES;
+    [first, second].iter().any(|tag| tag.is_in(&image.first))
 }
 
 /// Why color matrices do not count that are there without ColorMatrix1 where it belongs.
 fn astray(image: &RawImage) -> Option<&'static str> {
-    let [first, second] = tags::COLOR_MATRICES;
-    let mut all = [first, second, tags::COLOR_MATRIX_3].into_iter();
-    if tags::COLOR_MATRIX_3.is_in(&image.first) {
+    let [.., third] = tags::COLOR_MATRICES;
+    if third.is_in(&image.first) {
         Some("ColorMatrix1 is missing")
-    } else if all.any(|tag| tag.is_in(image.directory())) {
+    } else if tags::COLOR_MATRICES.iter().any(|tag| tag.is_in(image.directory())) {
         Some("it stands in the directory of the samples, and counts in the first alone")
     } else {
         None
@@ -159,7 +169,11 @@ fn mapped(
         OwnMatrix::Color => ("ColorMatrix", "not adapted"),
         OwnMatrix::Forward => ("ForwardMatrix", "adapted to D50"),
     };
-    let name = if calibration.second.is_some() { format!("{tag}1 and {tag}2") } else { format!("{tag}{first}") };
+    let name = match (&calibration.second, &calibration.third) {
+        (_, Some(_)) => format!("{tag}1, {tag}2 and {tag}3"),
+        (Some(_), None) => format!("{tag}1 and {tag}2"),
+        (None, None) => format!("{tag}{first}"),
+    };
     let observer = load_observer()?;
     let mapped = match which {
         OwnMatrix::Color => calibration.mapped(&observer, light),
@@ -183,44 +197,29 @@ fn light(file: &mut TiffFile, image: &RawImage) -> Result<std::result::Result<Li
         .ok_or_else(|| "nothing tells the white of the exposure (AsShotNeutral or AsShotWhiteXY)".to_owned()))
 }
 
-/// The matrices for one illuminant or two, and the number of the first. Of two, one whose illuminant has no known temperature is passed
-/// over, with a note; of two such the first counts, as Adobe's DNG SDK has it.
+/// The matrices for one illuminant, two or three, and the number of the first. Of two, one whose illuminant has no known temperature is passed
+/// over, with a note; of two such the first counts, as Adobe's DNG SDK has it, and a third of an unknown illuminant does not.
 fn calibration(
     file: &mut TiffFile,
     image: &RawImage,
     notes: &mut Vec<String>,
 ) -> Result<std::result::Result<(Calibration, usize), String>> {
     let directory = &image.first;
-    if tags::COLOR_MATRIX_3.is_in(directory) {
-        return Ok(Err("it has one for a third illuminant (ColorMatrix3), which is not supported".into()));
+    let analog_balance = tags::ANALOG_BALANCE.exactly::<3>(file, directory)?.unwrap_or([1.0; 3]);
+    if !analog_balance.iter().all(|gain| *gain > 0.0) {
+        return Ok(Err("AnalogBalance has a number that is not above 0".into()));
     }
-    let mut matrix = |tag: DngTag| -> Result<Option<Matrix3<f64>>> {
-        Ok(tag.exactly::<9>(file, directory)?.map(|elements| Matrix3::from_row_slice(&elements)))
-    };
-    let [one, two] = tags::COLOR_MATRICES;
-    let matrices = [matrix(one)?, matrix(two)?];
-    let [calibration_1, calibration_2] = tags::CAMERA_CALIBRATIONS;
-    let calibrations = [matrix(calibration_1)?, matrix(calibration_2)?];
-    let [forward_1, forward_2] = tags::FORWARD_MATRICES;
-    let forwards = [matrix(forward_1)?, matrix(forward_2)?];
-    let signature = |file: &mut TiffFile, tag: DngTag| -> Result<String> {
-        Ok(file.text(directory, tag.tag())?.unwrap_or_default())
-    };
-    // Those of the camera count where the profile was made for them.
-    let [of_camera, of_profile] = tags::CALIBRATION_SIGNATURES;
-    let counts = signature(file, of_camera)? == signature(file, of_profile)?;
-    let mut set = |index: usize, color_matrix: Matrix3<f64>| -> Result<Illuminated> {
-        let known = illuminants::temperature_of(file, directory, index)?;
-        let camera_calibration = calibrations[index].filter(|_| counts).unwrap_or_else(Matrix3::identity);
-        let forward_matrix = forwards[index];
-        Ok(Illuminated { temperature_k: known.unwrap_or(0.0), color_matrix, camera_calibration, forward_matrix })
-    };
-    let mut sets = Vec::new();
-    for (index, matrix) in matrices.into_iter().enumerate() {
-        if let Some(matrix) = matrix {
-            sets.push((index + 1, set(index, matrix)?));
+    match three(file, image, notes)? {
+        Err(why) => return Ok(Err(why)),
+        Ok(Some([first, second, third])) => {
+            let (second, third) = (Some(second), Some(third));
+            return Ok(Ok((Calibration { first, second, third, analog_balance }, 1)));
         }
+        Ok(None) => {}
     }
+    let sets = [illuminated(file, image, 0)?, illuminated(file, image, 1)?];
+    let mut sets: Vec<(usize, Illuminated)> =
+        (1..).zip(sets).filter_map(|(number, set)| Some((number, set?))).collect();
     let is_known = |(_, set): &(usize, Illuminated)| set.temperature_k != 0.0;
     if sets.len() > 1 && !sets.iter().all(is_known) {
         let why = if sets.iter().any(is_known) {
@@ -241,12 +240,58 @@ fn calibration(
     let Some(((number, first), second)) = sets.split_first() else {
         return Ok(Err("it has no color matrix (ColorMatrix1)".into()));
     };
-    let analog_balance = tags::ANALOG_BALANCE.exactly::<3>(file, directory)?.unwrap_or([1.0; 3]);
-    if !analog_balance.iter().all(|gain| *gain > 0.0) {
-        return Ok(Err("AnalogBalance has a number that is not above 0".into()));
-    }
     let second = second.first().map(|(_, set)| *set);
-    Ok(Ok((Calibration { first: *first, second, analog_balance }, *number)))
+    Ok(Ok((Calibration { first: *first, second, third: None, analog_balance }, *number)))
+}
+
+/// The matrices for three illuminants; none of fewer, or where that of the third is not known, with a note. Else why they do not count.
+fn three(
+    file: &mut TiffFile,
+    image: &RawImage,
+    notes: &mut Vec<String>,
+) -> Result<std::result::Result<Option<[Illuminated; 3]>, String>> {
+    let [.., third] = tags::COLOR_MATRICES;
+    if !third.is_in(&image.first) {
+        return Ok(Ok(None));
+    }
+    let mut sets = Vec::new();
+    for index in 0..tags::COLOR_MATRICES.len() {
+        let Some(set) = illuminated(file, image, index)? else {
+            let missing = tags::COLOR_MATRICES[index].1;
+            return Ok(Err(format!("it has one for a third illuminant (ColorMatrix3), but {missing} is missing")));
+        };
+        let white_xy = illuminants::white_of_illuminant(file, &image.first, index)?;
+        sets.push(Illuminated { white_xy, ..set });
+    }
+    let whites: Vec<Option<[f64; 2]>> = sets.iter().map(|set| set.white_xy).collect();
+    if let Some(unknown) = whites.iter().position(Option::is_none) {
+        let tag = tags::CALIBRATION_ILLUMINANTS[unknown].1;
+        notes.push(format!("its ColorMatrix3 does not count: nothing tells the light of one of the three ({tag})"));
+        return Ok(Ok(None));
+    }
+    let [one, two, three] = [0, 1, 2].map(|index| whites[index]);
+    if one == two || one == three || two == three {
+        return Ok(Err("two of its three illuminants are one light (CalibrationIlluminant1 to 3)".into()));
+    }
+    Ok(Ok(<[Illuminated; 3]>::try_from(sets).ok()))
+}
+
+/// The matrices for the illuminant of an index (0, 1, 2); none without a color matrix. The temperature is 0 where it is not known.
+fn illuminated(file: &mut TiffFile, image: &RawImage, index: usize) -> Result<Option<Illuminated>> {
+    let directory = &image.first;
+    let mut matrix = |tag: DngTag| -> Result<Option<Matrix3<f64>>> {
+        Ok(tag.exactly::<9>(file, directory)?.map(|elements| Matrix3::from_row_slice(&elements)))
+    };
+    let Some(color_matrix) = matrix(tags::COLOR_MATRICES[index])? else { return Ok(None) };
+    let forward_matrix = matrix(tags::FORWARD_MATRICES[index])?;
+    let camera_calibration = matrix(tags::CAMERA_CALIBRATIONS[index])?;
+    let mut signature = |tag: DngTag| file.text(directory, tag.tag());
+    // Those of the camera count where the profile was made for them.
+    let [of_camera, of_profile] = tags::CALIBRATION_SIGNATURES;
+    let counts = signature(of_camera)?.unwrap_or_default() == signature(of_profile)?.unwrap_or_default();
+    let camera_calibration = camera_calibration.filter(|_| counts).unwrap_or_else(Matrix3::identity);
+    let temperature_k = illuminants::temperature_of(file, directory, index)?.unwrap_or(0.0);
+    Ok(Some(Illuminated { temperature_k, white_xy: None, color_matrix, camera_calibration, forward_matrix }))
 }
 
 /// Notes what a converter would brighten its picture by.

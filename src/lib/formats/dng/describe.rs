@@ -6,7 +6,7 @@ use super::image::RawImage;
 use super::levels::Levels;
 use super::tags;
 use crate::cfa::{FILTERS, FilterArray};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::formats::exposure::{self, ToldExposure};
 use crate::formats::tiff::{Directory, TiffFile, passed_over, told_orientation};
 use crate::metadata::Metadata;
@@ -34,7 +34,7 @@ pub(super) fn describe(
     tags::AS_SHOT_NEUTRAL.numbers(file, &image.first, 4)?;
     let mut metadata = Metadata::new(QuantityKind::Adu);
     metadata.cfa = Some(if image.is_monochrome { FilterArray::Monochrome } else { filters(file, image, active)? });
-    metadata.black_level_adu = Some(levels.black);
+    metadata.black_level_adu = levels.black;
     metadata.black_by_row.clone_from(&levels.black_by_row);
     metadata.black_by_column.clone_from(&levels.black_by_column);
     metadata.white_level_adu = Some(levels.white.into());
@@ -54,10 +54,10 @@ pub(super) fn describe(
     if levels.table.is_some() {
         notes.push("samples are made linear by its LinearizationTable".into());
     }
-    metadata.orientation = told_orientation(tags::ORIENTATION.one(file, &image.first)?, notes);
-    for tag in tags::OPCODES.into_iter().filter(|tag| tag.is_in(image.directory())) {
-        notes.push(format!("its {}, corrections that converters make, is not applied", tag.1));
+    if let Some((share, level)) = levels.linear() {
+        notes.push(format!("above {level} ADU its samples may be far from linear (LinearResponseLimit {share})"));
     }
+    metadata.orientation = told_orientation(tags::ORIENTATION.one(file, &image.first)?, notes);
     Ok(metadata)
 }
 
@@ -83,6 +83,25 @@ pub(super) fn doubt_of_place(image: &RawImage) -> Option<String> {
             misplaced.join(" and ")
         )
     })
+}
+
+/// A doubt of an image whose noise was reduced before it was stored \[DNG2023, NoiseReductionApplied]; none where that is not known.
+///
+/// # Errors
+///
+/// Those of the disk.
+pub(super) fn doubt_of_noise(file: &mut TiffFile, image: &RawImage) -> Result<Option<String>> {
+    let told = match tags::NOISE_REDUCTION_APPLIED.exactly::<1>(file, image.directory()) {
+        // Ratios of zeros stand for what is not known.
+        Err(Error::Format { .. }) => None,
+        other => other?,
+    };
+    Ok(told.filter(|[share]| *share > 0.0).map(|[share]| {
+        format!(
+            "noise was taken out of its samples before they were stored (NoiseReductionApplied {share}): what is measured and predicted of \
+             their noise is not that of the sensor; turn the camera's noise reduction of raw files off"
+        )
+    }))
 }
 
 /// The notes on the part of the image that is read.

@@ -1,8 +1,9 @@
 //! The lights that the color matrices of a DNG are for.
 
 use super::tags;
-use crate::color::chromaticity;
+use crate::color::locus::planckian;
 use crate::color::temperature::correlated;
+use crate::color::{D50_XY, D65_XY, chromaticity};
 use crate::error::Result;
 use crate::formats::data::load_observer;
 use crate::formats::tiff::{Directory, TiffFile};
@@ -45,6 +46,44 @@ pub(in crate::formats) fn temperature_k(number: usize) -> Option<f64> {
     ILLUMINANTS.into_iter().find(|(known, _)| *known == number).map(|(_, kelvin)| kelvin)
 }
 
+/// Chromaticities of illuminants by their numbers, where three are told: those of the CIE \[CIE 015], of fluorescent lamps of F1, F8, F2, F3 and
+/// F4, whose temperatures lie in the ranges of Exif.
+const WHITES: [(&[usize], [f64; 2]); 12] = [
+    (&[3, 17], [0.447_57, 0.407_45]),
+    (&[18], [0.348_42, 0.351_61]),
+    (&[19], [0.310_06, 0.316_16]),
+    (&[23], D50_XY),
+    (&[1, 4, 9, 20], [0.332_42, 0.347_43]),
+    (&[10, 21], D65_XY),
+    (&[11, 22], [0.299_02, 0.314_85]),
+    (&[12], [0.313_10, 0.337_27]),
+    (&[13], [0.345_88, 0.358_75]),
+    (&[2, 14], [0.372_08, 0.375_29]),
+    (&[15], [0.409_10, 0.394_30]),
+    (&[16], [0.440_18, 0.403_29]),
+];
+/// Tungsten of studios, a black body of 3200 K.
+const STUDIO_TUNGSTEN: usize = 24;
+
+/// Chromaticity of an illuminant (0, 1, 2), by its number or its data; none where the file does not tell.
+///
+/// # Errors
+///
+/// Those of the disk, and of damaged tags.
+pub(super) fn white_of_illuminant(
+    file: &mut TiffFile,
+    directory: &Directory,
+    index: usize,
+) -> Result<Option<[f64; 2]>> {
+    match tags::CALIBRATION_ILLUMINANTS[index].one(file, directory)? {
+        Some(OTHER) => white_of_data(file, directory, index),
+        Some(STUDIO_TUNGSTEN) => Ok(Some(planckian(&load_observer()?, 3200.0))),
+        number => {
+            Ok(WHITES.into_iter().find(|(known, _)| number.is_some_and(|n| known.contains(&n))).map(|(_, xy)| xy))
+        }
+    }
+}
+
 /// Temperature in K of the first or second illuminant (0, 1), by its number or its data; none where the file does not tell.
 ///
 /// # Errors
@@ -55,13 +94,19 @@ pub(super) fn temperature_of(file: &mut TiffFile, directory: &Directory, index: 
     if number != Some(OTHER) {
         return Ok(number.and_then(temperature_k));
     }
+    let white = white_of_data(file, directory, index)?;
+    let observer = load_observer()?;
+    Ok(white.map(|white| correlated(&observer, white).temperature_k))
+}
+
+/// The chromaticity that the data of an illuminant tell.
+fn white_of_data(file: &mut TiffFile, directory: &Directory, index: usize) -> Result<Option<[f64; 2]>> {
     let most = BEFORE_SAMPLES + RATIO * SAMPLES.end();
     let Some(data) = tags::ILLUMINANT_DATA[index].numbers(file, directory, most as u64)? else { return Ok(None) };
     #[expect(clippy::cast_possible_truncation, reason = "the tag holds bytes")]
     let data: Vec<u8> = data.into_iter().map(|byte| byte as u8).collect();
     let observer = load_observer()?;
-    let white = white_of(&data, &observer, |bytes| file.number(bytes));
-    Ok(white.map(|white| correlated(&observer, white).temperature_k))
+    Ok(white_of(&data, &observer, |bytes| file.number(bytes)))
 }
 
 /// The chromaticity that the data of a light tell, whose numbers `number` makes of bytes: kind 0, x and y; kind 1, the number of samples,

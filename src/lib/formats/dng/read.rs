@@ -5,6 +5,7 @@ use super::describe;
 use super::image::RawImage;
 use super::levels::Levels;
 use super::noise;
+use super::opcodes::Said as Opcodes;
 use super::samples::ChunkRows;
 use super::storage::{Compression, Storage};
 use super::tags;
@@ -53,6 +54,8 @@ pub struct DngReader {
     storage: Storage,
     /// Linear values of stored ones.
     table: Option<Vec<f32>>,
+    /// From which share of the range on, and from which sample, they may be far from linear.
+    linear: Option<(f64, f64)>,
     area: Rectangle,
     geometry: Geometry,
     own_tags: Metadata,
@@ -100,7 +103,11 @@ impl DngReader {
         if let Some(doubt) = describe::doubt_of_black(&image, active).filter(|_| !is_ours) {
             register::doubt(format!("{name}: {doubt}"));
         }
-        describe::doubt_of_place(&image).into_iter().for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
+        let opcodes = Opcodes::of(&mut file, &image)?;
+        notes.extend(opcodes.notes);
+        let doubts = describe::doubt_of_place(&image).into_iter().chain(opcodes.doubts).chain(levels.doubt_of_black());
+        let of_noise = describe::doubt_of_noise(&mut file, &image)?;
+        doubts.chain(of_noise).for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
         // Codes in JPEG have as many bits as that says, whatever the tag.
         let is_jpeg = matches!(storage.compression, Compression::LosslessJpeg { .. });
         if let Some(doubt) = levels.doubt_of_white(storage.sample).filter(|_| !is_ours && !is_jpeg) {
@@ -118,6 +125,7 @@ impl DngReader {
         Ok(Self {
             file,
             storage,
+            linear: levels.linear(),
             table: levels.table,
             area,
             geometry,
@@ -285,6 +293,10 @@ impl SampleReader for DngReader {
 
     fn noise_profile(&self) -> Option<&NoiseProfile> {
         self.noise_profile.as_ref()
+    }
+
+    fn linear_limit(&self) -> Option<(f64, f64)> {
+        self.linear
     }
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {

@@ -60,6 +60,19 @@ impl CameraColor {
     }
 }
 
+/// Whether the tags of a file tell other colors (ColorMatrix1, AsShotNeutral) than metadata of ours by which they were written.
+pub(in crate::formats) fn are_other_colors(told: &Metadata, tagged: &Metadata) -> bool {
+    /// Programs that write tags anew round them to four decimals.
+    const SAME: f64 = 1e-3;
+    let Some((told, tagged)) = CameraColor::of_frame(told).zip(tagged.relative_matrix.as_ref()) else { return false };
+    let Some(inverse) = matrix(&tagged.xyz_from_camera).try_inverse() else { return false };
+    let neutral = inverse * Vector3::from(xyz_of_chromaticity(tagged.white_xy, 1.0));
+    let matrices = [inverse, matrix(&told.camera_from_xyz)].map(|matrix| matrix / matrix.norm());
+    let are_one = (neutral / neutral.max() - Vector3::from(told.neutral)).amax() <= SAME
+        && (matrices[0] - matrices[1]).amax() <= SAME;
+    !are_one
+}
+
 /// The white of a scene that was a picture in R, G, B: that of the illuminant which lit it, where it has a name.
 fn scene_white(metadata: &Metadata) -> Option<[f64; 2]> {
     let name = &metadata.scene.as_ref()?.upsampling.as_ref()?.illuminant;

@@ -31,18 +31,26 @@ pub(super) const BLACK_DELTA_V: DngTag = DngTag(50716, "BlackLevelDeltaV");
 pub(super) const WHITE_LEVEL: DngTag = DngTag(50717, "WhiteLevel");
 pub(super) const DEFAULT_CROP_ORIGIN: DngTag = DngTag(50719, "DefaultCropOrigin");
 pub(super) const DEFAULT_CROP_SIZE: DngTag = DngTag(50720, "DefaultCropSize");
-pub(super) const COLOR_MATRICES: [DngTag; 2] = [DngTag(50721, "ColorMatrix1"), DngTag(50722, "ColorMatrix2")];
-pub(super) const FORWARD_MATRICES: [DngTag; 2] = [DngTag(50964, "ForwardMatrix1"), DngTag(50965, "ForwardMatrix2")];
-pub(super) const COLOR_MATRIX_3: DngTag = DngTag(52531, "ColorMatrix3");
-pub(super) const CAMERA_CALIBRATIONS: [DngTag; 2] =
-    [DngTag(50723, "CameraCalibration1"), DngTag(50724, "CameraCalibration2")];
+pub(super) const COLOR_MATRICES: [DngTag; 3] =
+    [DngTag(50721, "ColorMatrix1"), DngTag(50722, "ColorMatrix2"), DngTag(52531, "ColorMatrix3")];
+pub(super) const FORWARD_MATRICES: [DngTag; 3] =
+    [DngTag(50964, "ForwardMatrix1"), DngTag(50965, "ForwardMatrix2"), DngTag(52532, "ForwardMatrix3")];
+pub(super) const CAMERA_CALIBRATIONS: [DngTag; 3] =
+    [DngTag(50723, "CameraCalibration1"), DngTag(50724, "CameraCalibration2"), DngTag(52530, "CameraCalibration3")];
 pub(super) const ANALOG_BALANCE: DngTag = DngTag(50727, "AnalogBalance");
 pub(super) const AS_SHOT_NEUTRAL: DngTag = DngTag(50728, "AsShotNeutral");
 pub(super) const AS_SHOT_WHITE_XY: DngTag = DngTag(50729, "AsShotWhiteXY");
 pub(super) const BASELINE_EXPOSURE: DngTag = DngTag(50730, "BaselineExposure");
-pub(super) const CALIBRATION_ILLUMINANTS: [DngTag; 2] =
-    [DngTag(50778, "CalibrationIlluminant1"), DngTag(50779, "CalibrationIlluminant2")];
-pub(super) const ILLUMINANT_DATA: [DngTag; 2] = [DngTag(52533, "IlluminantData1"), DngTag(52534, "IlluminantData2")];
+pub(super) const LINEAR_RESPONSE_LIMIT: DngTag = DngTag(50734, "LinearResponseLimit");
+pub(super) const COLORIMETRIC_REFERENCE: DngTag = DngTag(50879, "ColorimetricReference");
+pub(super) const NOISE_REDUCTION_APPLIED: DngTag = DngTag(50935, "NoiseReductionApplied");
+pub(super) const CALIBRATION_ILLUMINANTS: [DngTag; 3] = [
+    DngTag(50778, "CalibrationIlluminant1"),
+    DngTag(50779, "CalibrationIlluminant2"),
+    DngTag(52529, "CalibrationIlluminant3"),
+];
+pub(super) const ILLUMINANT_DATA: [DngTag; 3] =
+    [DngTag(52533, "IlluminantData1"), DngTag(52534, "IlluminantData2"), DngTag(52535, "IlluminantData3")];
 /// Of the camera, of the profile.
 pub(super) const CALIBRATION_SIGNATURES: [DngTag; 2] =
     [DngTag(50931, "CameraCalibrationSignature"), DngTag(50932, "ProfileCalibrationSignature")];
@@ -51,7 +59,8 @@ pub(super) const ROW_INTERLEAVE: DngTag = DngTag(50975, "RowInterleaveFactor");
 pub(super) const COLUMN_INTERLEAVE: DngTag = DngTag(52547, "ColumnInterleaveFactor");
 pub(super) const MASKED_AREAS: DngTag = DngTag(50830, "MaskedAreas");
 pub(super) const ACTIVE_AREA: DngTag = DngTag(50829, "ActiveArea");
-pub(super) const OPCODES: [DngTag; 2] = [DngTag(51008, "OpcodeList1"), DngTag(51009, "OpcodeList2")];
+pub(super) const OPCODES: [DngTag; 3] =
+    [DngTag(51008, "OpcodeList1"), DngTag(51009, "OpcodeList2"), DngTag(51022, "OpcodeList3")];
 
 // Light sources of Exif.
 pub(super) const UNKNOWN_LIGHT: u16 = 0;

@@ -100,9 +100,7 @@ fn scaled(white: u32, scale: f64) -> u32 {
 /// but not at the `highest` black level, that counts. Integers need none: it is the largest that 16 bits hold
 /// \[DNG2023, WhiteLevel].
 fn white(header: &FrameHeader, samples: TiffSamples, highest: f64) -> Result<u32> {
-    let full = FullLevels::of(header).map(|full| full.classes().map(f64::from).into_iter().fold(0.0, f64::max));
-    let largest = header.metadata.white_level_adu.map(WhiteLevel::largest);
-    match (largest.map(|white| full.filter(|full| full.floor() > highest).unwrap_or(white)), samples) {
+    match (white_of(header, highest), samples) {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -119,6 +117,21 @@ fn white(header: &FrameHeader, samples: TiffSamples, highest: f64) -> Result<u32
         }
         (None, TiffSamples::F32) => Err(header.missing("white_level_adu")),
     }
+}
+
+/// The level that the tag tells of a frame, before it is rounded down; none of a frame whose white level is not known.
+fn white_of(header: &FrameHeader, highest: f64) -> Option<f64> {
+    let full = FullLevels::of(header).map(|full| full.classes().map(f64::from).into_iter().fold(0.0, f64::max));
+    let largest = header.metadata.white_level_adu.map(WhiteLevel::largest);
+    largest.map(|white| full.filter(|full| full.floor() > highest).unwrap_or(white))
+}
+
+/// The WhiteLevel that is written of a frame; none where it does not hang on metadata alone.
+pub(in crate::formats) fn written_white(header: &FrameHeader) -> Option<f64> {
+    let black = header.black_levels().ok()?;
+    let size = [header.geometry.width, header.geometry.height];
+    let highest = black.as_ref().map_or(0.0, |black| black.largest(size, |_, _| None)[0]);
+    white_of(header, highest).map(|white| white.floor().max(0.0))
 }
 
 /// The filter array, and which samples are shown: all.

@@ -7,6 +7,7 @@ use crate::camera::levels::{BlackLevel, WhiteLevel};
 use crate::cfa::FilterArray;
 use crate::formats::format::SampleReader;
 use crate::formats::ljpeg::tests::{Encoding, encode, samples};
+use crate::metadata::FrameHeader;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use std::collections::BTreeMap;
@@ -371,6 +372,32 @@ fn levels_and_filters_hang_on_the_corner_of_the_sensor() {
     assert_eq!(reader.own_tags().black_level_adu, Some(BlackLevel::Sites([2.0, 1.0, 2.0, 1.0])));
 }
 
+/// Levels of more than 2x2 sites, by what they are said to be at each photosite: sums of sites, rows and columns to the bit; others are
+/// not known, and are told.
+#[test]
+fn black_levels_that_repeat_after_more_sites_are_sums_or_not_known() {
+    let image = Image::new(11, 9, 12).strips(&samples(99, 12, 1), 9, Image::plain).with(50717, SHORT, &[4000.0]);
+    let image = image.with(50829, LONG, &[1.0, 3.0, 9.0, 11.0]).with(50716, SIGNED_RATIO, &[1.0, 4.0].repeat(8));
+    for [rows, columns] in [[4, 4], [1, 3], [6, 1], [3, 5], [4, 2]] {
+        let sum = |y: usize, x: usize| (100 + y * y * 3 % 17 + x * x * 5 % 13) as f64;
+        let levels: Vec<f64> = (0..rows).flat_map(|y| (0..columns).map(move |x| sum(y, x))).collect();
+        let told = image.clone().with(50713, SHORT, &[rows as f64, columns as f64]).with(50714, SHORT, &levels);
+        let reader = open(&told.file(&[]), RawArea::Active).unwrap();
+        let metadata = reader.own_tags().clone();
+        let frame = FrameHeader { name: "a".into(), geometry: reader.geometry().clone(), metadata };
+        let black = frame.black_levels().unwrap().unwrap();
+        for (y, x) in (0..8).flat_map(|y| (0..8).map(move |x| (y, x))) {
+            assert_eq!(black.row(y).at(x), sum(y % rows, x % columns) + 0.25, "{rows}x{columns} {y} {x}");
+        }
+    }
+    // A color of a quad array each, of which the last is no sum.
+    let quad: Vec<f64> = (0..16).map(|at| [64.0, 65.0, 66.0, 70.0][at / 8 * 2 + at % 4 / 2]).collect();
+    let told = image.with(50713, SHORT, &[4.0, 4.0]).with(50714, SHORT, &quad);
+    let reader = open(&told.file(&[]), RawArea::Active).unwrap();
+    assert_eq!(reader.own_tags().black_level_adu, None);
+    assert!(reader.own_tags().black_by_column.is_empty());
+}
+
 #[test]
 fn other_arrays_are_told() {
     let image = Image::new(12, 12, 12).strips(&samples(144, 12, 1), 12, Image::plain);
@@ -507,10 +534,6 @@ fn what_cannot_be_read_is_refused_by_name() {
         (image.clone().with(33422, BYTE, &[0.0, 1.0, 1.0, 2.0, 0.0]), "its CFAPattern has more filters"),
         (image.clone().with(50829, LONG, &[0.0, 0.0, 6.0, 8.0, 1.0]), "its tag ActiveArea has more than 4 numbers"),
         (
-            image.clone().with(50713, SHORT, &[1.0, 3.0]).with(50714, SHORT, &[1.0, 2.0, 1.0]),
-            "its black level differs by 1x3 sites",
-        ),
-        (
             image.clone().with(50716, SIGNED_RATIO, &[1.0, 1.0]),
             "its BlackLevelDeltaV has 1 numbers, and the active area has 6 rows",
         ),
@@ -589,6 +612,25 @@ fn matrices_of_unknown_illuminants_are_passed_over() {
     let (method, notes) = told(&with_data.with(52534, UNDEFINED, &data.collect::<Vec<_>>()));
     assert!(method.starts_with("ColorMatrix1 and ColorMatrix2 of the DNG"), "{method}: {notes}");
     assert!(told(&both.clone().without(50721).with(50779, SHORT, &[21.0])).0.starts_with("ColorMatrix2 of the DNG"));
+    // Three, by their lights; a third that is not known does not count, and one of the others does.
+    let third =
+        both.clone().with(50778, SHORT, &[17.0]).with(50779, SHORT, &[21.0]).with(52531, SIGNED_RATIO, &matrix(7.0));
+    let (method, notes) = told(&third.clone().with(52529, SHORT, &[14.0]));
+    assert!(method.starts_with("ColorMatrix1, ColorMatrix2 and ColorMatrix3 of the DNG"), "{method}: {notes}");
+    let (method, notes) = told(&third);
+    assert!(method.starts_with("ColorMatrix1 and ColorMatrix2 of the DNG"), "{method}: {notes}");
+    assert!(notes.contains("its ColorMatrix3 does not count") && notes.contains("(CalibrationIlluminant3)"), "{notes}");
+    for (image, wanted) in [
+        (third.clone().with(52529, SHORT, &[10.0]), "two of its three illuminants are one light"),
+        (third.clone().without(50722), "it has one for a third illuminant (ColorMatrix3), but ColorMatrix2 is missing"),
+        (
+            image.clone().with(50879, SHORT, &[1.0]),
+            "the colors of a picture, not of the scene (ColorimetricReference 1)",
+        ),
+    ] {
+        let (method, notes) = told(&image);
+        assert!(method.is_empty() && notes.contains(wanted), "{method}: {notes}");
+    }
     let long = told(&image.clone().with(50721, SIGNED_RATIO, &[1.0; 24]));
     assert!(long.0.is_empty() && long.1.contains("its tag ColorMatrix1 has more than 9 numbers"), "{}", long.1);
     let four = told(&image.with(50728, RATIO, &[1.0; 8]));

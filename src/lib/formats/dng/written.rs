@@ -253,6 +253,7 @@ fn what_the_raw_file_told_is_told_on() {
         quantity: QuantityKind::Adu,
         demosaicked: false,
         unlike_levels: 0.0,
+        cut_off: None,
     };
     let dark = CorrectionRecord { dark_frames: 1, ..CorrectionRecord::of_black(0.0.into(), false) };
     let changes: [&dyn Fn(&mut Metadata); 2] = [&|m| m.average = Some(average), &|m| m.correction = Some(dark.clone())];

@@ -11,12 +11,12 @@ const CARD_BYTES: usize = 80;
 /// A header may have this many bytes.
 const MOST_BYTES: usize = 64 << 20;
 /// Keywords that are kept besides those that begin with `NAXIS`; a header may have very many.
-const KEPT: [&str; 42] = [
+const KEPT: [&str; 47] = [
     "SIMPLE", "XTENSION", "BITPIX", "PCOUNT", "GCOUNT", "GROUPS", "ZIMAGE", "BSCALE", "BZERO", "BLANK", "BUNIT",
     "EXTNAME", "BAYERPAT", "COLORTYP", "XBAYROFF", "YBAYROFF", "ROWORDER", "EXPTIME", "EXPOSURE", "EXPOINUS",
     "FOCALLEN", "APTDIA", "FOCRATIO", "CCD-TEMP", "GAIN", "EGAIN", "PEDESTAL", "OFFSET", "BLKLEVEL", "INSTRUME",
     "READOUTM", "XBINNING", "YBINNING", "IMAGETYP", "FRAME", "OBSTYPE", "INHERIT", "XORGSUBF", "YORGSUBF", "CALSTAT",
-    "STACKCNT", "NCOMBINE",
+    "STACKCNT", "NCOMBINE", "FILTER", "SATURATE", "BIASSEC", "DATASEC", "TRIMSEC",
 ];
 /// Keywords of one part alone, which another never inherits, besides those that begin with `NAXIS`.
 const OF_ONE_PART: [&str; 12] = [

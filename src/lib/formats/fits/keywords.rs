@@ -2,6 +2,7 @@
 
 use super::header::{Header, whole};
 use super::units::{LENGTH, TEMPERATURE, TIME, number_of};
+use crate::camera::levels::WhiteLevel;
 use crate::camera::readout::LEAST_TEMPERATURE_K;
 use crate::cfa::FilterArray;
 use crate::formats::exposure::{self, ToldExposure};
@@ -25,6 +26,8 @@ pub(super) struct Told {
     pub metadata: Metadata,
     /// The first row of the array is the lowest of the picture.
     pub is_bottom_up: bool,
+    /// The part that is the picture, where it is not all, and the keyword that tells it.
+    pub picture: Option<(&'static str, [i64; 4])>,
     /// What was passed over, and why.
     pub notes: Vec<String>,
     /// What contradicts itself.
@@ -51,6 +54,7 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
         metadata.unit = visible(unit).into_owned();
     }
     metadata.cfa = cfa;
+    metadata.white_level_adu = saturation(header, metadata.quantity, is_integer, &mut notes);
     metadata.camera = header.text("INSTRUME").map(|camera| visible(camera).into_owned());
     let exposure = told_exposure(header, &mut notes, &mut doubts);
     ToldExposure::describe(exposure, &mut metadata);
@@ -64,7 +68,24 @@ pub(super) fn read(header: &Header, channels: usize, is_integer: bool) -> Told {
     });
     note_settings(header, &mut notes);
     doubts.extend(doubt_of_stack(header));
-    Told { metadata, is_bottom_up: first_row == FirstRow::Bottom, notes, doubts }
+    Told { metadata, is_bottom_up: first_row == FirstRow::Bottom, picture: None, notes, doubts }
+}
+
+/// The code from which on samples are saturated, by `SATURATE`, of integers that may be codes.
+fn saturation(
+    header: &Header,
+    quantity: QuantityKind,
+    is_integer: bool,
+    notes: &mut Vec<String>,
+) -> Option<WhiteLevel> {
+    let level = header.number("SATURATE")?;
+    let may_be_codes = is_integer && matches!(quantity, QuantityKind::Adu | QuantityKind::Unspecified);
+    if may_be_codes && level > 0.0 && level.is_finite() {
+        notes.push(format!("its white level, {level} ADU, is its SATURATE"));
+        return Some(level.into());
+    }
+    notes.push(format!("its SATURATE of {level} is passed over: no white level of codes is such"));
+    None
 }
 
 /// Which row of the picture the array begins with. Programs write the words with a blank, a line or nothing between.
@@ -306,6 +327,11 @@ fn told_settings(header: &Header) -> Option<CameraSettings> {
         e_per_adu: header.number("EGAIN").filter(|gain| *gain > 0.0),
         offset: header.number("OFFSET").or_else(|| header.number("BLKLEVEL")),
         readout_mode: header.text("READOUTM").map(|mode| visible(mode.trim()).into_owned()),
+        filter: header
+            .text("FILTER")
+            .map(str::trim)
+            .filter(|name| !name.is_empty())
+            .map(|name| visible(name).into_owned()),
     };
     let is_finite = |number: Option<f64>| number.is_none_or(f64::is_finite);
     let is_sound = [found.gain, found.e_per_adu, found.offset].into_iter().all(is_finite);

@@ -5,6 +5,7 @@
 mod header;
 mod keywords;
 mod read;
+mod sections;
 #[cfg(test)]
 mod tests;
 mod units;

@@ -2,6 +2,7 @@
 
 use super::header::{Array, BLOCK_BYTES, Header, Kind};
 use super::keywords::{self, Told};
+use super::sections::Sections;
 use crate::error::{Error, Result};
 use crate::formats::files::spool;
 use crate::formats::format::{
@@ -226,6 +227,9 @@ fn described(name: &str, header: &Header, array: &Array) -> Result<(Form, Geomet
     let geometry = geometry(name, &array.axes)?;
     let mut told = keywords::read(header, geometry.channels.len(), array.bitpix > 0 && !form.is_scaled());
     told.notes.extend(form.notes());
+    let Sections { masked, picture, notes } = Sections::of(header, &geometry, told.is_bottom_up);
+    (told.metadata.masked_areas, told.picture) = (masked, picture);
+    told.notes.extend(notes);
     told.doubts.drain(..).for_each(|doubt| register::doubt(format!("{name}: {doubt}")));
     Ok((form, geometry, told))
 }
@@ -402,6 +406,10 @@ impl SampleReader for FitsReader {
 
     fn own_tags(&self) -> &Metadata {
         &self.told.metadata
+    }
+
+    fn picture(&self) -> Option<(&'static str, [i64; 4])> {
+        self.told.picture
     }
 
     fn notes(&self) -> &[String] {

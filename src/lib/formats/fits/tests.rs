@@ -456,6 +456,18 @@ fn keywords_of_the_camera_are_used_or_told() {
     assert_eq!((metadata.quantity, metadata.unit.as_str()), (QuantityKind::Unspecified, "MJy/sr"));
 }
 
+/// Filters by their names, and the white level of codes alone.
+#[test]
+fn filters_and_saturation_are_told() {
+    let told = |cards: &[(&str, Value)]| keywords::read(&Header::of(cards), 1, true).metadata;
+    let saturate =
+        |unit: &str, level: f64| told(&[("BUNIT", text(unit)), ("SATURATE", Value::Number(level))]).white_level_adu;
+    assert_eq!(saturate("ADU", 65_000.0), Some(65_000.0.into()));
+    assert_eq!([saturate("ADU", 0.0), saturate("electron", 65_000.0)], [None; 2]);
+    let filter = |name: &str| told(&[("FILTER", text(name))]).camera_settings.and_then(|settings| settings.filter);
+    assert_eq!([filter("Ha"), filter("  ")], [Some("Ha".to_owned()), None]);
+}
+
 #[test]
 fn values_of_cards() {
     let cards = header(&[

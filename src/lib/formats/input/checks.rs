@@ -4,6 +4,7 @@ mod steps;
 
 use super::codes::CodeCheck;
 use super::levels::LevelCheck;
+use super::linear::LinearCheck;
 use super::masked::MaskedCheck;
 use super::time::TimeCheck;
 use super::top::TopCheck;
@@ -19,6 +20,8 @@ pub(super) struct Checks {
     pub said_black: Option<BlackLevel>,
     /// What comes off as a black level.
     pub taken_black: Option<BlackLevels>,
+    /// From which share of the range, and which sample, on the file says that samples may be far from linear.
+    pub linear_limit: Option<(f64, f64)>,
     /// Whether samples that are heaped at the top are told, and times that cannot be.
     tells_top: bool,
     codes: Option<CodeCheck>,
@@ -27,6 +30,7 @@ pub(super) struct Checks {
     masked: Option<MaskedCheck>,
     time: Option<TimeCheck>,
     steps: Option<StepCheck>,
+    linear: Option<LinearCheck>,
 }
 
 impl Checks {
@@ -43,6 +47,7 @@ impl Checks {
             self.top = TopCheck::of(frame).filter(|_| self.tells_top && !is_marked);
             self.steps = StepCheck::of(frame).filter(|_| !is_marked);
             self.time = TimeCheck::of(frame, is_tagged).filter(|_| self.tells_top);
+            self.linear = self.linear_limit.map(|limit| LinearCheck::of(frame, limit));
             self.masked = self.taken_black.take().and_then(|black| MaskedCheck::of(frame, black));
         }
     }
@@ -59,6 +64,7 @@ impl Checks {
         self.masked.iter_mut().for_each(|masked| masked.look(rows, frame));
         self.time.iter_mut().for_each(|time| time.look(rows, frame));
         self.steps.iter_mut().for_each(|steps| steps.look(rows, frame));
+        self.linear.iter_mut().for_each(|linear| linear.look(rows));
         Ok(())
     }
 
@@ -72,6 +78,7 @@ impl Checks {
         self.masked.take().into_iter().for_each(|masked| masked.end(frame));
         self.time.take().into_iter().for_each(|time| time.end(frame));
         self.steps.take().iter().for_each(|steps| steps.end(frame));
+        self.linear.take().iter().for_each(|linear| linear.end(frame));
         self.levels.as_mut().map_or(Ok(()), |levels| levels.end(frame))
     }
 }

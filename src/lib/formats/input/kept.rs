@@ -3,6 +3,7 @@
 use super::options::InputOptions;
 use crate::analysis::statistics::Region;
 use crate::error::{Error, Result};
+use crate::formats::register;
 use crate::frame::{Geometry, THREE_PLANES};
 use crate::metadata::{FrameHeader, Metadata};
 use crate::names::place_of;
@@ -66,12 +67,40 @@ fn unit_of(stored: &Geometry, place: usize, unit: &str) -> String {
     own.filter(|_| units.len() > 1).map_or(unit, |own| *own).to_owned()
 }
 
+/// Cuts a frame down to a rectangle, where one is wanted, and gives the column and row that come first. A frame that has more than the
+/// picture which its file tells, by what tag and where, is doubted.
+///
+/// # Errors
+///
+/// As [`cut`].
+pub(super) fn cut_to(
+    header: &mut FrameHeader,
+    crop: Option<Region>,
+    picture: Option<(&'static str, [i64; 4])>,
+) -> Result<[usize; 2]> {
+    let Geometry { width, height, .. } = header.geometry;
+    let Region { x, y, width, height } = crop.unwrap_or(Region { x: 0, y: 0, width, height });
+    let kept = [x, y, x.saturating_add(width), y.saturating_add(height)].map(|side| side as i64);
+    let beyond = picture.filter(|(_, [x, y, width, height])| {
+        kept[0] < *x || kept[1] < *y || kept[2] > x + width || kept[3] > y + height
+    });
+    let corner = crop.map_or(Ok([0, 0]), |crop| cut(header, crop))?;
+    if let Some((tag, [x, y, width, height])) = beyond {
+        register::doubt(format!(
+            "{}: its picture is {width}x{height} from {x},{y} ({tag}), and what lies beside counts as picture too; --crop \
+             {x},{y},{width},{height} leaves it out",
+            header.name
+        ));
+    }
+    Ok(corner)
+}
+
 /// Cuts a frame down to a rectangle, and gives the column and row that come first.
 ///
 /// # Errors
 ///
 /// [`Error::Usage`] where it does not lie within the frame.
-pub(super) fn cut(header: &mut FrameHeader, crop: Region) -> Result<[usize; 2]> {
+fn cut(header: &mut FrameHeader, crop: Region) -> Result<[usize; 2]> {
     crop.check(header).map_err(|error| error.change(&["crop"]))?;
     let geometry = &mut header.geometry;
     for (first, by) in geometry.origin.iter_mut().zip([crop.x, crop.y]) {

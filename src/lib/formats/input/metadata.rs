@@ -5,6 +5,7 @@ use crate::camera::levels::BlackLevel;
 use crate::camera::optics::doubt_of_time;
 use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
+use crate::formats::dng::{are_other_colors, written_white};
 use crate::formats::files::{read_file, sidecar_path};
 use crate::formats::format::SampleReader;
 use crate::formats::viewable::{Scaling, is_scale};
@@ -185,15 +186,16 @@ fn tagged_otherwise(metadata: &Metadata, reader: &dyn SampleReader) -> Vec<Strin
     let aperture = |metadata: &Metadata| metadata.exposure.map(|exposure| exposure.f_number);
     compare("exposure time in s", metadata.time_s().zip(tags.time_s()));
     compare("f-number", aperture(metadata).zip(aperture(tags)));
+    compare("sensitivity (ISO)", metadata.iso_speed.zip(tags.iso_speed));
     // What was multiplied for viewers has other levels in the file.
     if metadata.sample_scale.is_none() {
         compare("black level in ADU", metadata.uniform_black_adu().zip(tags.uniform_black_adu()));
-        let white = |metadata: &Metadata| metadata.white_level_adu.map(|white| white.largest());
-        let are_codes = metadata.quantity == QuantityKind::Adu && metadata.correction.is_none();
-        // Ours write the level of full well where that is below.
-        let may_be_full_well = metadata.sensor.is_some();
-        let is_comparable = |(told, tagged): &(f64, f64)| are_codes && (tagged > told || !may_be_full_well);
-        compare("white level in ADU", white(metadata).zip(white(tags)).filter(is_comparable));
+        found.extend(other_white(metadata, reader));
+    }
+    if are_other_colors(metadata, tags) {
+        found.push(
+            "its colors are others by the tags of the file (ColorMatrix1, AsShotNeutral), which do not count".into(),
+        );
     }
     let own = reader.geometry().origin;
     // Levels of sites, from the frame's first photosite on.
@@ -215,11 +217,29 @@ fn tagged_otherwise(metadata: &Metadata, reader: &dyn SampleReader) -> Vec<Strin
         let pattern = metadata.cfa.and_then(FilterArray::bayer)?;
         Some([0, 1].map(|row| pattern.row_classes(origin, row)))
     };
-    let classes = first(metadata, metadata.origin.unwrap_or(own)).zip(first(tags, own));
-    if classes.is_some_and(|(told, tagged)| told != tagged) {
+    let place = metadata.origin.unwrap_or(own);
+    let classes = first(metadata, place).zip(first(tags, own));
+    // Of other arrays that have the same place.
+    let arrays = metadata.cfa.zip(tags.cfa).filter(|(told, _)| told.bayer().is_none() && place == own);
+    if classes.is_some_and(|(told, tagged)| told != tagged) || arrays.is_some_and(|(told, tagged)| told != tagged) {
         found.push("its filter array is another by the tags of the file, which do not count".into());
     }
     found
+}
+
+/// A warning of a white level of tags that is neither that of the metadata nor what is written of it: the level of full well, where that is
+/// below, and whole.
+fn other_white(metadata: &Metadata, reader: &dyn SampleReader) -> Option<String> {
+    let white = |metadata: &Metadata| metadata.white_level_adu.map(|white| white.largest());
+    let (told, tagged) = white(metadata).zip(white(reader.own_tags()))?;
+    let stored = reader.geometry();
+    let origin = metadata.origin.unwrap_or(stored.origin);
+    let geometry = Geometry { origin, ..stored.clone() };
+    let frame = FrameHeader { name: String::new(), geometry, metadata: metadata.clone() };
+    let is_written = [Some(told.floor()), written_white(&frame)].contains(&Some(tagged));
+    let is_codes = metadata.quantity == QuantityKind::Adu;
+    (is_codes && !is_written && told != tagged)
+        .then(|| format!("its white level in ADU is {told}, but {tagged} by the tags of the file, which do not count"))
 }
 
 /// Warnings of what a file of metadata says.

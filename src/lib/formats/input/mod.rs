@@ -7,6 +7,7 @@ mod codes;
 mod described;
 mod kept;
 mod levels;
+mod linear;
 mod masked;
 mod metadata;
 mod opening;
@@ -19,7 +20,7 @@ pub(crate) use time::TOO_DARK;
 
 use self::checks::Checks;
 use self::described::DigestCheck;
-use self::kept::{LEFT_OUT, Taken, count_marks, cut, left_out};
+use self::kept::{LEFT_OUT, Taken, count_marks, cut_to, left_out};
 use self::metadata::{Found, doubt_of_marks, find_metadata, placed, take_scaling};
 use self::opening::{head_of, is_file, of_upstream, open_part, open_piped, readers_of};
 use super::dng::{DngReader, RawArea};
@@ -222,7 +223,7 @@ impl FrameReader {
         let mut header = FrameHeader { name: name.into(), geometry: Geometry { origin, ..geometry }, metadata };
         camera::say(&mut header, &options.camera);
         doubt_of_marks(&header, stored);
-        let corner = options.crop.map_or(Ok([0, 0]), |crop| cut(&mut header, crop))?;
+        let corner = cut_to(&mut header, options.crop, reader.picture())?;
         let linearize = match &options.linearize {
             Linearizing::No => None,
             Linearizing::As(sensor) => {
@@ -452,6 +453,7 @@ impl RowSource for FrameReader {
         if !self.has_begun {
             self.has_begun = true;
             let is_tagged = self.header.metadata.time_s() == self.reader.own_tags().time_s();
+            self.checks.linear_limit = self.reader.linear_limit();
             self.checks.begin(&self.header, self.mask.is_some(), self.linearize.is_none(), is_tagged);
             self.pass_over(self.corner[1], &mut buffer)?;
         }

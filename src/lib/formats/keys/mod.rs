@@ -206,6 +206,7 @@ mod tests {
                 ("adc.", field_names::<AdcRecord>()),
                 ("adc.linearization.", field_names::<Linearization>()),
                 ("average.", field_names::<ExposuresRecord>()),
+                ("average.cut_off.", field_names::<CutOffRecord>()),
                 ("averaged.", field_names::<DrawnExposures>()),
                 ("correction.", field_names::<CorrectionRecord>()),
                 ("correction.masters.", field_names::<MasterRecord>()),

@@ -172,6 +172,7 @@ fn calibration(head: &Head) -> std::result::Result<Calibration, String> {
     let is_one = |elements: &[f64]| elements.len() == 9 && elements.iter().all(|element| element.is_finite());
     let set = |(illuminant, elements): &(u16, Vec<f64>)| Illuminated {
         temperature_k: temperature_k((*illuminant).into()).unwrap_or(0.0),
+        white_xy: None,
         color_matrix: Matrix3::from_row_slice(elements),
         camera_calibration: Matrix3::identity(),
         forward_matrix: None,
@@ -183,9 +184,9 @@ fn calibration(head: &Head) -> std::result::Result<Calibration, String> {
     sets.sort_by(|a, b| a.temperature_k.total_cmp(&b.temperature_k));
     let [first, .., last] = sets.as_slice() else {
         let one = sets.first().ok_or("no matrix of it is one of three classes for an illuminant with a temperature")?;
-        return Ok(Calibration { first: *one, second: None, analog_balance: [1.0; 3] });
+        return Ok(Calibration { first: *one, second: None, third: None, analog_balance: [1.0; 3] });
     };
-    Ok(Calibration { first: *first, second: Some(*last), analog_balance: [1.0; 3] })
+    Ok(Calibration { first: *first, second: Some(*last), third: None, analog_balance: [1.0; 3] })
 }
 
 /// The signals of white, by what they are multiplied with to be alike.

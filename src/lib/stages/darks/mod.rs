@@ -1,7 +1,7 @@
 //! Dark and bias frames that count as one: what they make of it comes off a frame while its rows are read.
 
 mod alike;
-mod cut_off;
+pub mod cut_off;
 mod fitness;
 mod frames;
 mod stack;

@@ -16,6 +16,8 @@ pub(super) struct Blocks {
     classes: usize,
     /// The sum of each class of each block, and of how many.
     sums: Vec<(f64, f64)>,
+    /// Sums of the columns of cells within a block.
+    run: Vec<f64>,
 }
 
 impl Blocks {
@@ -26,20 +28,34 @@ impl Blocks {
         let [width, height] = size.map(|side| i32::try_from(side).unwrap_or(i32::MAX));
         let [x, y] = geometry.origin;
         let sums = vec![(0.0, 0.0); counts[0] * counts[1] * classes];
-        Self { area: [x, y, width, height], size, counts, classes, sums }
+        Self { area: [x, y, width, height], size, counts, classes, sums, run: Vec::new() }
     }
 
-    /// The block at a place of the frame.
-    pub(super) fn of_place(&self, place: [usize; 2]) -> usize {
-        let [column, row] = [0, 1].map(|axis| place[axis] * self.counts[axis] / self.size[axis]);
-        row * self.counts[0] + column
-    }
-
-    /// Takes in a photosite.
-    pub(super) fn take(&mut self, block: usize, class: usize, flat: f64) {
-        let (sum, count) = &mut self.sums[block * self.classes + class];
-        *sum += flat;
-        *count += 1.0;
+    /// Takes in the photosites of row `y` in cells of so many columns, where these are whole; of the classes `of_row`, again and again. A
+    /// cell belongs to the block that its first column lies in, so that sums run from one block to the next.
+    pub(super) fn take_row(&mut self, y: usize, columns: usize, row: &[f64], whole: &[bool], of_row: &[usize]) {
+        let [across, down] = self.counts;
+        let first = y * down / self.size[1] * across;
+        self.run.resize(columns, 0.0);
+        let mut begin = 0;
+        for block in 0..across {
+            let end = ((block + 1) * self.size[0]).div_ceil(across * columns).min(whole.len());
+            self.run.fill(0.0);
+            let mut count = 0_u32;
+            for (cell, _) in
+                row[begin * columns..].chunks_exact(columns).zip(&whole[begin..end]).filter(|(_, whole)| **whole)
+            {
+                self.run.iter_mut().zip(cell).for_each(|(sum, flat)| *sum += flat);
+                count += 1;
+            }
+            for (place, added) in self.run.iter().enumerate() {
+                let class = of_row[place % of_row.len()];
+                let (sum, photosites) = &mut self.sums[(first + block) * self.classes + class];
+                *sum += added;
+                *photosites += f64::from(count);
+            }
+            begin = end;
+        }
     }
 
     /// The illumination that they tell, of classes with such means; of a block without photosites that of the nearest that has some.
@@ -74,16 +90,15 @@ mod tests {
         let geometry = Geometry { origin: [10, 20], ..Geometry::new(48, 32, &["plane"]) };
         let mut blocks = Blocks::of(&geometry, 2);
         for y in 0..32 {
-            for x in 0..48 {
-                let class = (x + y) % 2;
-                if x < 32 || y < 16 {
-                    let block = blocks.of_place([x, y]);
-                    blocks.take(block, class, [100.0, 700.0][class] * if x < 16 { 0.5 } else { 1.25 });
-                }
-            }
+            let light = if y < 8 { 1.0 } else { 1.5 };
+            let level = |x: usize| [100.0, 700.0][(x + y) % 2] * if x < 16 { 0.5 } else { 1.25 } * light;
+            let row: Vec<f64> = (0..48).map(level).collect();
+            let whole: Vec<bool> = (0..24).map(|cell| cell < 16 || y < 16).collect();
+            blocks.take_row(y, 2, &row, &whole, &[y % 2, (y + 1) % 2]);
         }
         let light = blocks.illumination(&[100.0, 700.0]);
-        let shares = (0..24).map(|block| if block % 6 < 2 { 0.5 } else { 1.25 });
+        assert_eq!(blocks.sums.iter().map(|(_, count)| count).sum::<f64>(), f64::from(32 * 32 + 16 * 16));
+        let shares = (0..24).map(|block| if block % 6 < 2 { 0.5 } else { 1.25 } * if block < 6 { 1.0 } else { 1.5 });
         let wanted = Illumination::new([10, 20, 48, 32], [6, 4], shares.collect());
         assert_eq!(light, wanted);
     }

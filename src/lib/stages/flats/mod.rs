@@ -87,6 +87,7 @@ impl<S: RowSource> FlatFrames<S> {
                 return Err(head.refuse("no light fell on it; a flat field is lit evenly"));
             }
         }
+        warnings.extend(flats.iter().find_map(|flat| doubt_of_filter(frame, flat.header())));
         let is_even = |flat: &S| flat.header().metadata.scene.as_ref().is_some_and(|scene| scene.uniform);
         let mut head = first.header().clone();
         head.metadata.bloomed_photosites =
@@ -272,16 +273,15 @@ impl<S: RowSource> FlatFrames<S> {
             tally.last.fill(None);
             let [x0, y0] = self.head.geometry.origin.map(|origin| usize::from(origin & 1 != 0));
             let of_rows = (first + row + y0) % 2 * 2;
-            for (cell, flats) in self.made[(row * planes + plane) * width..][..width].chunks_exact(columns).enumerate()
-            {
+            let line = &self.made[(row * planes + plane) * width..][..width];
+            tally.blocks.take_row(first + row, columns, line, &tally.whole, &of_row);
+            for (cell, flats) in line.chunks_exact(columns).enumerate() {
                 if tally.whole.get(cell) != Some(&true) {
                     continue;
                 }
-                let block = tally.blocks.of_place([cell * columns, first + row]);
                 for (x, flat) in (cell * columns..).zip(flats) {
                     let class = of_row[x % of_row.len()];
                     tally.take(class, of_rows + (x + x0) % 2, *flat);
-                    tally.blocks.take(block, class, *flat);
                 }
             }
         }
@@ -379,6 +379,17 @@ impl<S: RowSource> FlatFrames<S> {
             shares_masters: false,
         }
     }
+}
+
+/// A warning of a flat through another filter than `frame`, as far as both tell it.
+fn doubt_of_filter(frame: &FrameHeader, flat: &FrameHeader) -> Option<String> {
+    let settings = flat.metadata.camera_settings.as_ref().zip(frame.metadata.camera_settings.as_ref());
+    let [its, theirs] = settings.and_then(|(flat, frame)| flat.other_filter(frame))?;
+    Some(format!(
+        "{}: it was taken through the filter `{its}`, and {} through `{theirs}`: dust and the responses of photosites to its light are others; \
+         give flats through the same filter",
+        flat.name, frame.name
+    ))
 }
 
 /// The head of flats whose metadata name no sensor with that of the frame that they are for, where both were taken with the same settings:
