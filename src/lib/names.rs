@@ -43,6 +43,9 @@ pub fn nearest<'a>(
     farthest: impl Fn(&str) -> usize,
 ) -> Option<&'a str> {
     let known: Vec<&str> = known.into_iter().collect();
+    if let Some(same) = known.iter().find(|known| **known == typed) {
+        return Some(same);
+    }
     // One that goes on where another ends, as with its unit, is meant rather than one that looks like it.
     let begin = typed.to_owned() + "_";
     if let Some(longer) = known.iter().filter(|known| known.starts_with(&begin)).min_by_key(|known| known.len()) {

@@ -222,11 +222,10 @@ impl Propagating for ToXyz {
             let covariance = match (self.space(), self.coordinates().jacobian(xyz)) {
                 (Space::Xyz, _) => of_xyz,
                 (_, Some(jacobian)) => through(&of_xyz, &jacobian),
-                // Without a temperature there is no uncertainty of one, and luminance has its own; other colors without
-                // chromaticity have a fixed one.
-                (Space::Cct, None) => [f64::NAN, f64::NAN, f64::NAN, f64::NAN, f64::NAN, of_xyz[3]],
-                (Space::Xyy, None) => [0.0, 0.0, 0.0, 0.0, 0.0, of_xyz[3]],
-                (_, None) => [0.0; 6],
+                (_, None) => {
+                    let [first, second, third] = self.coordinates().variances_without_chromaticity(xyz, of_xyz[3]);
+                    [first, f64::NAN, f64::NAN, second, f64::NAN, third]
+                }
             };
             let shown = if self.space() == Space::Xyz { covariance.len() } else { 0 };
             (covariance.into_iter().take(shown).chain(stds(&covariance)), holds)

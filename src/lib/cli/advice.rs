@@ -2,7 +2,7 @@
 
 use crate::error::{Advice, Error};
 use crate::formats::data::spectrum_file;
-use crate::formats::files::near_file;
+use crate::formats::files::hint_of_missing;
 use clap::Command;
 use std::ffi::OsString;
 use std::io;
@@ -51,7 +51,7 @@ pub(super) fn advised(error: &Error, command: &Command) -> String {
             let words: Vec<OsString> = std::env::args_os().skip(1).collect();
             let path = Path::new(file);
             let hint = misplaced(file, command, &in_text(&words)).or_else(|| known_spectrum(path));
-            let hint = hint.or_else(|| near_file(path).map(|near| format!("did you mean `{near}`?")));
+            let hint = hint.or_else(|| hint_of_missing(path));
             hint.map_or_else(|| error.to_string(), |hint| format!("{error}; {hint}"))
         }
         _ => error.to_string(),

@@ -93,7 +93,12 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
         ErrorKind::MissingRequiredArgument => {
             let any = argument.trim_start_matches('<').replace(">>", ">").replace('|', " or ");
             let any = if argument.starts_with("<--") { any } else { argument };
-            format!("{any} is missing, without which an option that is given has no effect")
+            let idle = idle_option(command, words).unwrap_or("an option that is given");
+            format!("{any} is missing, without which {idle} has no effect")
+        }
+        ErrorKind::TooManyValues => {
+            let bare = argument.split([' ', '=']).next().unwrap_or(&argument).to_owned();
+            format!("{bare} takes no value; leave `{value}` out")
         }
         ErrorKind::ArgumentConflict => {
             let other = context(ContextKind::PriorArg).unwrap_or_default();
@@ -110,6 +115,22 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
     };
     let joined = if problem.ends_with('?') { " See" } else { "; see" };
     format!("{problem}{joined} `{program} --help`")
+}
+
+/// The option without which nothing would be missing.
+fn idle_option<'a>(command: &Command, words: &'a [String]) -> Option<&'a str> {
+    let is_enough_without = |place: usize, of_it: usize| {
+        let kept = words
+            .iter()
+            .enumerate()
+            .filter(|(at, _)| !(place..place + of_it).contains(at))
+            .map(|(_, word)| word.as_str());
+        let parsed = command.clone().try_get_matches_from(std::iter::once("").chain(kept));
+        parsed.is_ok()
+    };
+    let options = words.iter().enumerate().filter(|(_, word)| word.starts_with("--"));
+    let mut idle = options.filter(|(place, _)| [1, 2].into_iter().any(|of_it| is_enough_without(*place, of_it)));
+    idle.next().map(|(_, word)| word.split('=').next().unwrap_or(word))
 }
 
 /// An option with its value in quotes, where an argument too many is part of that: `--radiance-unit W m-2 sr-1 nm-1`.
@@ -245,7 +266,7 @@ const GUESSED_VALUES: [(&str, &str); 14] = [
 ];
 
 /// Options as people guess them, and what they are here; it counts where the program has the option.
-const GUESSES: [(&str, &str); 24] = [
+const GUESSES: [(&str, &str); 41] = [
     ("aperture", "--f-number"),
     ("fnumber", "--f-number"),
     ("time", "--exposure"),
@@ -264,7 +285,24 @@ const GUESSES: [(&str, &str); 24] = [
     ("colormap", "--false-color"),
     ("cmap", "--false-color"),
     ("algorithm", "--method"),
+    ("bayer", "--cfa"),
     ("bayer", "--pattern"),
+    ("layer", "--plane"),
+    ("stretch", "--range"),
+    ("scale", "--range"),
+    ("limits", "--range"),
+    ("max-width", "--fit"),
+    ("thumbnail", "--fit"),
+    ("colorspace", "--space"),
+    ("color-space", "--space"),
+    ("errors", "--sigma"),
+    ("error-bars", "--sigma"),
+    ("std", "--sigma"),
+    ("uncertainty", "--sigma"),
+    ("iso", "--setting"),
+    ("bitdepth", "--bits"),
+    ("read-noise", "--without"),
+    ("no-prnu", "--without"),
     ("ccm", "--matrix"),
     ("illuminant", "--white"),
     ("whitepoint", "--white"),

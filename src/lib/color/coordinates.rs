@@ -1,6 +1,6 @@
 //! From XYZ to the coordinates of a space, and what small changes of XYZ become there.
 
-use super::luv::{luv_about, luv_from_xyz};
+use super::luv::{luv_about, luv_from_xyz, uv_prime};
 use super::temperature::Locus;
 use super::{Space, chromaticity, lab_about, lab_from_xyz, linear_srgb_from_xyz, srgb_encode, xyy_about, xyy_from_xyz};
 use nalgebra::{Matrix3, Vector3};
@@ -33,6 +33,8 @@ pub struct Placed {
     pub is_far_above_white: bool,
     /// Whether it has no correlated color temperature.
     pub is_off_locus: bool,
+    /// Whether its coordinates are those of white because it has no chromaticity.
+    pub has_no_chromaticity: bool,
 }
 
 impl Coordinates {
@@ -75,7 +77,27 @@ impl Coordinates {
         };
         let refers = matches!(self.space, Space::Lab | Space::Luv | Space::LinearSrgb);
         let is_far_above_white = refers && xyz[1] > FAR_ABOVE_WHITE * self.white[1];
-        Placed { value, was_clipped, is_far_above_white, is_off_locus }
+        let is_finite = xyz.iter().all(|value| value.is_finite());
+        let has_no_chromaticity = match self.space {
+            Space::Xyy => is_finite && xyz.iter().sum::<f64>() <= 0.0,
+            Space::Luv => is_finite && uv_prime(xyz).is_none(),
+            _ => false,
+        };
+        Placed { value, was_clipped, is_far_above_white, is_off_locus, has_no_chromaticity }
+    }
+
+    /// Variances of the coordinates of a color that has no derivatives, by the variance of its luminance: of a chromaticity that is
+    /// that of white for want of one there is no end, and a temperature that is none has none.
+    pub fn variances_without_chromaticity(&self, xyz: [f64; 3], of_luminance: f64) -> [f64; 3] {
+        match self.space {
+            Space::Cct => [f64::NAN, f64::NAN, of_luminance],
+            Space::Xyy => [f64::INFINITY, f64::INFINITY, of_luminance],
+            Space::Luv => {
+                let slope = lab_about(xyz, self.white).jacobian[(0, 1)];
+                [slope * slope * of_luminance, f64::INFINITY, f64::INFINITY]
+            }
+            _ => [0.0; 3],
+        }
     }
 
     /// Derivatives of the coordinates in X, Y and Z at a color; none of a picture to look at, and where the color has no

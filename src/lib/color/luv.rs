@@ -19,7 +19,7 @@ fn lightness(y: f64, white: f64) -> [f64; 3] {
 }
 
 /// u′ and v′; none where the divisor is not above zero.
-fn uv_prime([x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
+pub(super) fn uv_prime([x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
     let divisor = x + 15.0 * y + 3.0 * z;
     (divisor > 0.0).then(|| [4.0 * x / divisor, 9.0 * y / divisor])
 }

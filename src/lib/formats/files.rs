@@ -87,8 +87,11 @@ pub fn read_table(input: impl Read, name: &str) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The file in the same directory whose name is nearest to one that is not there.
-pub fn near_file(path: &Path) -> Option<String> {
+/// What may be meant by the name of a file that is not there: the file in the same directory whose name is nearest; of a link where it leads.
+pub fn hint_of_missing(path: &Path) -> Option<String> {
+    if let Ok(target) = path.read_link() {
+        return Some(format!("it is a link to `{}`, which is not there", target.display()));
+    }
     /// A letter for so many may be off, and so many of an ending.
     const LETTERS: usize = 5;
     const ENDING: usize = 4;
@@ -98,6 +101,7 @@ pub fn near_file(path: &Path) -> Option<String> {
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
     let files = directory.unwrap_or(Path::new(".")).read_dir().ok()?.take(LOOKED_AT).flatten();
     let mut names: Vec<String> = files.filter_map(|file| file.file_name().into_string().ok()).collect();
+    names.retain(|name| name != typed);
     names.sort_unstable();
     let is_same_stem = |known: &str| Path::new(known).file_stem() == path.file_stem();
     let farthest = |known: &str| if is_same_stem(known) { ENDING } else { known.len().min(typed.len()) / LETTERS };
@@ -106,7 +110,7 @@ pub fn near_file(path: &Path) -> Option<String> {
     let frames: Vec<&str> = names.iter().map(String::as_str).filter(|name| has_metadata(name)).collect();
     let known = if frames.is_empty() { names.iter().map(String::as_str).collect() } else { frames };
     let near = nearest(typed, known, farthest)?;
-    Some(path.with_file_name(near).display().to_string())
+    Some(format!("did you mean `{}`?", path.with_file_name(near).display()))
 }
 
 #[cfg(test)]
@@ -126,17 +130,17 @@ pub(super) mod tests {
         for name in ["clear_zenith.csv", "a.exr", "b.exr"] {
             std::fs::write(directory.path().join(name), "").unwrap();
         }
-        let told = |name: &str| near_file(&directory.path().join(name));
-        let wanted = directory.path().join("clear_zenith.csv").display().to_string();
+        let told = |name: &str| hint_of_missing(&directory.path().join(name));
+        let wanted = format!("did you mean `{}`?", directory.path().join("clear_zenith.csv").display());
         assert_eq!(told("clear_zenit.csv"), Some(wanted));
-        assert!(["a.ex", "a.tiff"].iter().all(|name| told(name).unwrap().ends_with("a.exr")));
+        assert!(["a.ex", "a.tiff"].iter().all(|name| told(name).unwrap().ends_with("a.exr`?")));
         for name in ["m.png", "m.tiff", "m.tiff.yaml"] {
             std::fs::write(directory.path().join(name), "").unwrap();
         }
-        assert!(told("m.exr").unwrap().ends_with("m.tiff"));
+        assert!(told("m.exr").unwrap().ends_with("m.tiff`?"));
         // One of the same stem, though another's name is nearer.
         std::fs::write(directory.path().join("clear"), "").unwrap();
-        assert!(told("clear_zenith").unwrap().ends_with("clear_zenith.csv"));
+        assert!(told("clear_zenith").unwrap().ends_with("clear_zenith.csv`?"));
         assert_eq!([told("hazy.csv"), told("dark.exr"), told("nodir/a.exr")], [None, None, None]);
     }
 

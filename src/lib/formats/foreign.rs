@@ -286,6 +286,9 @@ fn wanted(expected: &str) -> String {
         other if ["an array", "a tuple", "tuple"].iter().any(|begin| other.starts_with(begin)) => {
             count().map_or("a list".into(), |count| format!("a list of {count}"))
         }
+        other if other.starts_with("sequence of ") => {
+            format!("a list of {}", other.trim_start_matches("sequence of ").trim_end_matches(" elements"))
+        }
         other if other.contains("enum") || other.contains("variant") || other.contains("tag") => {
             "one of the forms that are read".into()
         }

@@ -5,7 +5,7 @@ use super::cells::MAX_CELLS;
 use super::csv::SpectralTable;
 use super::cut_off::doubt_of_radiances;
 use super::data::{near_spectrum, spectrum_file, without_data};
-use super::files::{named, near_file, open_named, read_table, spool};
+use super::files::{hint_of_missing, named, open_named, read_table, spool};
 use super::format::HEAD_BYTES;
 use super::input::{FrameReader, InputOptions};
 use super::radiance_unit::{self, Brightness, FileSays, times_white};
@@ -141,7 +141,7 @@ pub fn open(options: &InputOptions) -> Result<Radiances> {
 /// there are no data.
 pub fn with_near_name(error: Error, path: Option<&Path>) -> Error {
     let advice = || {
-        let beside = path.and_then(near_file).map(|near| format!("did you mean `{near}`?"));
+        let beside = path.and_then(hint_of_missing);
         let of_data = |near| format!("did you mean `{near}`? `cyanometer list spectra` tells those known by name");
         beside.or_else(|| path.and_then(near_spectrum).map(of_data)).or_else(|| path.and_then(without_data))
     };

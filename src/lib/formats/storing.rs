@@ -279,7 +279,7 @@ impl OutputOptions {
             (None, Some("dng")) => Ok(Format::Dng),
             (None, Some("png")) => Ok(Format::Png),
             (None, Some(end)) => Err(Error::Usage(format!(
-                "{}: `.{end}` names no format that is written here; end the name in .exr, .tiff, .dng or .png, or give --format",
+                "{}: `.{end}` names no format that is written here; end the name in .exr, .tiff, .dng or .png (for a stack of frames in .zarr, by `stack-frames`), or give --format",
                 path.unwrap_or(Path::new("-")).display()
             ))),
         }

@@ -89,7 +89,7 @@ pub(super) fn scale_of(frame: &FrameHeader, fills_u16: bool) -> Result<f64> {
         }
         other => {
             return Err(frame.refuse(format!(
-                "{other} is no light that viewers show; write it as it is, and make a picture with `preview` or `to-xyz \
+                "what it holds, {other}, is no light that viewers show; write it as it is, and make a picture with `preview` or `to-xyz \
                  --space srgb`"
             )));
         }

@@ -480,6 +480,9 @@ pub struct SamplesRecord {
     /// Colors without a correlated color temperature, NaN.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub off_locus: Option<u64>,
+    /// Colors without a chromaticity, whose coordinates are those of white.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub no_chromaticity: Option<u64>,
     /// Pixels whose noise cannot be propagated, green being too near its noise to divide by.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub propagation_void: Option<u64>,

@@ -25,7 +25,7 @@ struct Arguments {
     /// EXR file for the differences of each pixel, channels delta_e_76, jnd, delta_e_94, delta_e_2000
     #[arg(long, value_name = "FILE.exr", value_parser = values::exr_file())]
     map: Option<PathBuf>,
-    /// Scale the map by a power of two so that viewers show it: 100, the difference of black and white, comes into (½, 1].
+    /// Scale the map by a power of two so that viewers show it which show channels by name: 100, the difference of black and white, comes into (½, 1].
     /// Programs of this toolchain undo it to the bit
     #[arg(long, requires = "map")]
     viewable: bool,

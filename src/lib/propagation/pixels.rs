@@ -153,10 +153,9 @@ impl PixelNoise {
     pub fn of(frame: &FrameHeader) -> Result<Self> {
         let metadata = &frame.metadata;
         let record = metadata.demosaic.as_ref().ok_or_else(|| {
-            frame.out_of_order(
-                format!("it holds {}, and nothing says how it was demosaicked", frame.holds()),
-                "demosaic",
-            )
+            let is_before_mosaic = frame.leads_with_three_planes();
+            let problem = format!("it holds {}, and nothing says how it was demosaicked", frame.holds());
+            frame.out_of_order(problem, if is_before_mosaic { "mosaic" } else { "demosaic" })
         })?;
         let method = Method::named(&record.method)
             .ok_or_else(|| frame.refuse(format!("it was demosaicked by `{}`, a method unknown here", record.method)))?;

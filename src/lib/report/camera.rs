@@ -1,7 +1,7 @@
 //! Reports of measured cameras: as text, JSON, YAML and Markdown.
 
 use super::camera_defects::{defects_of, outstanding, patterns_of};
-use super::{form_of, in_digits, table, unwritable};
+use super::{check_yaml_name, form_of, in_digits, table, unwritable};
 use crate::analysis::photon_transfer::{ClassFindings, Finding, PatternView};
 use crate::error::Result;
 use crate::formats::places::named;
@@ -80,6 +80,7 @@ impl CameraOutputs {
             PlotFormat::of_path(plot)?;
         }
         form_of(self.output_format, self.output.as_deref())?;
+        check_yaml_name(self.sensor_out.as_deref(), "sensor")?;
         register::announce(&[self.output.as_deref(), self.plot.as_deref(), self.sensor_out.as_deref()])
     }
 

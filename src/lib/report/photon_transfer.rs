@@ -52,11 +52,8 @@ pub fn photon_transfer(curve: &TransferCurve) -> Plot {
     panel.add("fixed pattern", Color::Green, Marks::Dashed(curve(&pattern)));
     panel.series.retain(|series| !series.marks.is_empty());
     let regimes = [("read", Color::Vermillion), ("shot", Color::Blue), ("fixed pattern", Color::Green)];
-    let ruling = |level: &ChainPrediction| {
-        let noise = [floor(level), shot(level), pattern(level)];
-        (0..regimes.len()).max_by(|&a, &b| noise[a].total_cmp(&noise[b])).unwrap_or_default()
-    };
-    panel.regions.extend(regimes_of(held, &signal, &ruling).into_iter().map(|(ruler, from, to)| {
+    let noises = |level: &ChainPrediction| [floor(level), shot(level), pattern(level)];
+    panel.regions.extend(regimes_of(held, &signal, &noises).into_iter().map(|(ruler, from, to)| {
         let (label, color) = regimes[ruler];
         Region { from, to: if clipped.is_empty() { to } else { to.min(clip) }, label: label.into(), color }
     }));
@@ -99,13 +96,29 @@ fn split_where_clipped(levels: &[ChainPrediction], class: usize) -> (&[ChainPred
     if first == levels.len() { (levels, &[]) } else { (&levels[..first], &levels[first.saturating_sub(1)..]) }
 }
 
-/// Which cause rules from where to where. A regime ends half way, in the logarithm, to the first level of the next.
+/// Which cause rules from where to where. A regime ends where the curves of two causes cross, drawn straight in the logarithm from level
+/// to level.
 fn regimes_of(
     levels: &[ChainPrediction],
     signal: &dyn Fn(&ChainPrediction) -> f64,
-    ruling: &dyn Fn(&ChainPrediction) -> usize,
+    noises: &dyn Fn(&ChainPrediction) -> [f64; 3],
 ) -> Vec<(usize, f64, f64)> {
-    let border = |i: usize| (signal(&levels[i - 1]) * signal(&levels[i])).sqrt();
+    let ruling = |level: &ChainPrediction| {
+        let noise = noises(level);
+        (0..noise.len()).max_by(|&a, &b| noise[a].total_cmp(&noise[b])).unwrap_or_default()
+    };
+    let border = |i: usize| {
+        let [before, behind] = [&levels[i - 1], &levels[i]];
+        if signal(before) <= 0.0 {
+            return 0.0;
+        }
+        let [old, new] = [ruling(before), ruling(behind)];
+        let lead = |level: &ChainPrediction| (noises(level)[old] / noises(level)[new]).ln();
+        let share = lead(before) / (lead(before) - lead(behind));
+        // Where a cause has no noise its curve begins at the next level.
+        let share = if (0.0..=1.0).contains(&share) { share } else { 0.5 };
+        (signal(before).ln() * (1.0 - share) + signal(behind).ln() * share).exp()
+    };
     let (mut found, mut start) = (Vec::new(), 0);
     while start < levels.len() {
         let ruler = ruling(&levels[start]);
@@ -160,6 +173,17 @@ mod tests {
             // The read noise of the default sensor lies within.
             let read = points("read-out and dark signal").first().map_or(f64::INFINITY, |[_, noise]| *noise);
             assert!(read == 0.0 || low < read, "{low} {read}");
+        }
+    }
+
+    /// A floor and a noise that grows as the root of the signal are straight in the logarithm: they cross at one place, however few levels
+    /// are drawn.
+    #[test]
+    fn regimes_part_where_curves_cross() {
+        let border = |sweep: &str| panel(None, Some(sweep)).regions[0].to;
+        let fine = border("10:30000:500log");
+        for sweep in ["10:30000:50log", "10:30000:5log", "1:30000:20lin"] {
+            assert!((border(sweep) / fine - 1.0).abs() < 1e-3, "{sweep}: {} {fine}", border(sweep));
         }
     }
 }

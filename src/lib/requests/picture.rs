@@ -84,7 +84,7 @@ pub struct PictureOptions {
     /// Show every pixel as a square of N x N
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=64))]
     zoom: usize,
-    /// Make the picture at most N pixels wide and high: each is the mean of a square of samples, in linear light, of whole
+    /// Make the picture at most N pixels wide and high, a scale bar or caption beside it: each is the mean of a square of samples, in linear light, of whole
     /// periods of a filter array
     #[arg(long, value_name = "N", conflicts_with = "zoom", value_parser = RangedU64ValueParser::<usize>::new().range(16..=8192))]
     fit: Option<usize>,

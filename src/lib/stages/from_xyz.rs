@@ -158,21 +158,15 @@ impl FromXyz {
         let through = |jacobian: Matrix3<f64>| jacobian * whole * jacobian.transpose();
         let made = jacobian.map_or_else(
             || {
-                let space = self.coordinates.space();
-                let mut absent = Matrix3::repeat(if space == Space::Cct { f64::NAN } else { 0.0 });
-                // Luminance has an uncertainty where what stands beside it has none.
-                if matches!(space, Space::Cct | Space::Xyy) {
-                    absent[(2, 2)] = through(self.adaptation)[(1, 1)];
-                }
-                absent
+                let of_luminance = through(self.adaptation)[(1, 1)];
+                Matrix3::from_diagonal(&self.coordinates.variances_without_chromaticity(xyz, of_luminance).into())
             },
             |jacobian| through(jacobian * self.adaptation),
         );
         let shown = if self.coordinates.space() == Space::Xyz { PAIRS.len() } else { 0 };
         let covariances = PAIRS.map(|pair| made[pair]);
-        let stds = [0, 1, 2].map(|k| made[(k, k)].max(0.0).sqrt());
-        // The larger of a NaN and 0 is 0.
-        let stds = if made[(0, 0)].is_nan() { [f64::NAN, f64::NAN, stds[2]] } else { stds };
+        // The larger of a NaN and 0 would be 0.
+        let stds = [0, 1, 2].map(|k| if made[(k, k)].is_nan() { f64::NAN } else { made[(k, k)].max(0.0).sqrt() });
         covariances.into_iter().take(shown).chain(stds)
     }
 }
@@ -315,6 +309,25 @@ mod tests {
         }
         let (_, counts) = through(&pixel([0.0, 100.0, 0.0], None), &settings(Space::Cct));
         assert_eq!((counts.not_finite, counts.off_locus), (0, 1));
+    }
+
+    /// A chromaticity that is white's for want of one is not known at all; luminance and lightness are.
+    #[test]
+    fn colors_without_chromaticity_have_no_end_of_uncertainty() {
+        let (of_luminance, infinite) = (0.04_f32, f32::INFINITY);
+        let frame = pixel([-9.0, -1.0, 2.0], Some([1.0, 0.0, 0.0, of_luminance, 0.0, 1.0]));
+        // L* is straight below (6/29)³ of white: 903.3 Y/Yₙ.
+        let of_lightness = 0.2 * 9.033;
+        for (space, expected) in
+            [(Space::Xyy, [infinite, infinite, 0.2]), (Space::Luv, [of_lightness, infinite, infinite])]
+        {
+            let (made, counts) = through(&frame, &settings(space));
+            assert_eq!((counts.no_chromaticity, counts.not_finite), (1, 0));
+            for (found, expected) in made.samples[3..].iter().zip(expected) {
+                assert!(*found == expected || (found / expected - 1.0).abs() < 1e-4, "{space}: {:?}", made.samples);
+            }
+        }
+        assert_eq!(through(&frame, &settings(Space::Lab)).1.no_chromaticity, 0);
     }
 
     /// Covariances against small shifts along a column of a factor of Σ = f fᵀ: a space that is smooth moves by J f.

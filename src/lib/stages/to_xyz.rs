@@ -216,6 +216,7 @@ pub(super) fn place(coordinates: &Coordinates, xyz: [f64; 3], counts: &mut Count
     counts.out_of_gamut += u64::from(placed.was_clipped);
     counts.far_above_white += u64::from(placed.is_far_above_white);
     counts.off_locus += u64::from(placed.is_off_locus);
+    counts.no_chromaticity += u64::from(placed.has_no_chromaticity);
     // Where there is no temperature, what is no number is counted already.
     let is_finite = placed.value.iter().all(|value| value.is_finite());
     counts.not_finite += u64::from(!is_finite && !placed.is_off_locus);

@@ -26,6 +26,8 @@ pub struct Counts {
     pub far_above_white: u64,
     /// Colors without a correlated color temperature.
     pub off_locus: u64,
+    /// Colors without a chromaticity, whose coordinates are those of white.
+    pub no_chromaticity: u64,
     /// Pixels whose noise cannot be propagated.
     pub propagation_void: u64,
     /// Samples at or above the level from which they are full.
@@ -54,6 +56,7 @@ impl Counts {
             out_of_gamut: self.out_of_gamut + other.out_of_gamut,
             far_above_white: self.far_above_white + other.far_above_white,
             off_locus: self.off_locus + other.off_locus,
+            no_chromaticity: self.no_chromaticity + other.no_chromaticity,
             propagation_void: self.propagation_void + other.propagation_void,
             saturated_samples: self.saturated_samples + other.saturated_samples,
             saturated_pixels: self.saturated_pixels + other.saturated_pixels,
@@ -79,6 +82,7 @@ impl Counts {
             out_of_gamut: some(self.out_of_gamut),
             far_above_white: some(self.far_above_white),
             off_locus: some(self.off_locus),
+            no_chromaticity: some(self.no_chromaticity),
             propagation_void: some(self.propagation_void),
             saturated: some(self.saturated_samples + self.saturated_pixels),
             defective: some(self.defective),
@@ -101,6 +105,7 @@ impl Counts {
             out_of_gamut: count(record.out_of_gamut),
             far_above_white: count(record.far_above_white),
             off_locus: count(record.off_locus),
+            no_chromaticity: count(record.no_chromaticity),
             propagation_void: count(record.propagation_void),
             saturated_samples: count(record.saturated),
             saturated_pixels: 0,
@@ -153,6 +158,11 @@ impl Counts {
                 self.off_locus,
                 "colors have no correlated color temperature, which is NaN: they lie more than 0.05 from black bodies, or beyond \
                  1000 K to 1000000 K",
+            ),
+            (
+                self.no_chromaticity,
+                "colors have no chromaticity, for X + Y + Z (of u and v X + 15 Y + 3 Z) is not above 0: x and y are those of white, u* and v* \
+                 are 0, and their standard deviations infinite",
             ),
             (
                 self.propagation_void,

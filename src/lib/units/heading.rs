@@ -83,9 +83,26 @@ fn is_relative(text: &str) -> bool {
     WORDS.contains(&bare) || bare == "arbu" || bare == "relu"
 }
 
-/// Words for irradiance; all but the first three are libRadtran's.
-const IRRADIANCES: [&str; 9] =
-    ["irradiance", "irradiances", "exitance", "edir", "eglo", "edn", "eup", "edif", "eglobal"];
+/// Words for irradiance: the language's, libRadtran's, those of solar energy and of the color of water.
+const IRRADIANCES: [&str; 17] = [
+    "irradiance",
+    "irradiances",
+    "irrad",
+    "exitance",
+    "flux",
+    "edir",
+    "eglo",
+    "edn",
+    "eup",
+    "edif",
+    "eglobal",
+    "ghi",
+    "dni",
+    "dhi",
+    "etr",
+    "ed",
+    "es",
+];
 /// libRadtran's words for means over directions.
 const MEANS: [&str; 6] = ["uavg", "uavgdir", "uavgdn", "uavgup", "uavgdif", "uavgglo"];
 const RADIANCE: [&str; 2] = ["radiance", "radiances"];
@@ -653,6 +670,9 @@ mod tests {
             ("spectral_irradiance_w_per_m2_nm", Irradiance),
             ("edir", Irradiance),
             ("eglo", Irradiance),
+            ("GHI", Irradiance),
+            ("Ed(0+)", Irradiance),
+            ("irrad", Irradiance),
             ("Wm-2nm-1", Irradiance),
             ("photons s-1 m-2 sr-1 nm-1", Photons),
             ("L (umol m-2 s-1 sr-1 nm-1)", Photons),

@@ -290,7 +290,10 @@ impl CameraMatrix {
                 return Err(format!("`{key}` is {number}; it must be above 0"));
             }
         }
-        if crate::color::matrix(&self.xyz_from_camera).try_inverse().is_none() {
+        /// The least of its singular values to the largest: decimals of equal rows leave 1e-17, cameras are above 0.01.
+        const LEAST: f64 = 1e-9;
+        let singular = crate::color::matrix(&self.xyz_from_camera).singular_values();
+        if singular.min().partial_cmp(&(LEAST * singular.max())) != Some(std::cmp::Ordering::Greater) {
             return Err("its `xyz_from_camera` is singular: three signals would not give three stimuli".into());
         }
         Ok(())

@@ -31,10 +31,14 @@ pub fn load_matrix(path: &Path) -> Result<CameraMatrix> {
     let bytes = read_file(path).map_err(|error| match error {
         Error::Disk { file, source, .. } if source.kind() == io::ErrorKind::NotFound => {
             let problem = match load_sensor(&file) {
-                Ok(_) => format!(
-                    "that is a sensor, and a file of a matrix is wanted; `fit-matrix sky912.exr --sensor {file} -o matrix.yaml` makes one \
-                     for it"
-                ),
+                Ok(sensor) => {
+                    // Responses of the library have neither a read-out nor a scale.
+                    let lacks = if sensor.sensor.readout.is_none() { " --readout FILE --peak-quantum-efficiency SHARE" } else { "" };
+                    format!(
+                        "that is a sensor, and a file of a matrix is wanted; `fit-matrix sky912.exr --sensor {file}{lacks} -o matrix.yaml` \
+                         makes one for it"
+                    )
+                }
                 Err(_) => {
                     "there is no such file; `fit-matrix` makes a matrix, as in `fit-matrix sky912.exr -o matrix.yaml`".into()
                 }
@@ -137,5 +141,27 @@ mod tests {
         // Equal energy has x = y = ⅓ to the rounding of the tables (CIE 015, Table T.4: 0.33333 to 0.33334).
         let total: f64 = sums.iter().sum();
         assert!(sums.iter().all(|sum| (sum / total - 1.0 / 3.0).abs() < 1e-4), "{sums:?}");
+    }
+
+    /// Two rows that are the same in decimals, and one that is nearly the sum of others.
+    #[test]
+    fn matrices_that_lose_a_dimension_are_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("m.yaml");
+        for (last, is_read) in
+            [("[8.7e-4, 4.5e-5, 4.4e-5]", false), ("[0.0, 0.0, 0.0]", false), ("[1.0e-4, -1.6e-4, 5.3e-4]", true)]
+        {
+            let text = format!(
+                "schema: cyanometer-matrix/1\nmethod: sky-rad-ls\nunit: cd m-2 per (ADU s-1 sr-1)\nxyz_from_camera: [[8.7e-4, 4.5e-5, 4.4e-5], \
+                 [3.7e-4, 3.1e-4, -2.6e-5], {last}]\n"
+            );
+            std::fs::write(&path, text).unwrap();
+            let said = load_matrix(&path).err().map_or(String::new(), |error| error.to_string());
+            assert_eq!(
+                said.contains("is singular: three signals would not give three stimuli"),
+                !is_read,
+                "{last}: {said}"
+            );
+        }
     }
 }

@@ -83,7 +83,7 @@ impl Choice {
 
     /// Whether no number of what is shown can be below 0: a difference of colors, a standard deviation, light as it is expected.
     pub fn is_never_negative(&self, frame: &FrameHeader) -> bool {
-        let is_spread = |name: &str| name.starts_with("sigma.") || name.starts_with("variance.");
+        let is_spread = |name: &str| name.starts_with(SIGMA) || name.starts_with(VARIANCE);
         let is_light = matches!(
             frame.metadata.quantity,
             QuantityKind::ColorDifference | QuantityKind::SpectralRadiance | QuantityKind::ExpectedElectrons
@@ -159,14 +159,17 @@ fn known(frame: &FrameHeader) -> String {
 
 /// What a channel is called, a layer by what it belongs to: `sigma.Y` where files and reports have `sigma.G`.
 fn in_words(frame: &FrameHeader, channel: &str) -> String {
-    match channel.strip_prefix(SIGMA) {
-        Some(base) => format!("{SIGMA}{}", frame.name_of(base)),
+    let layer = [SIGMA, VARIANCE].into_iter().find_map(|kind| Some((kind, channel.strip_prefix(kind)?)));
+    match layer {
+        Some((kind, base)) => format!("{kind}{}", frame.name_of(base)),
         None => frame.name_of(channel).to_owned(),
     }
 }
 
 /// What begins the name of a layer of standard deviations.
 const SIGMA: &str = "sigma.";
+/// What begins the name of a layer of variances over frames.
+const VARIANCE: &str = "variance.";
 /// What begins the name of a layer of covariances.
 const COVARIANCE: &str = "covariance.";
 
@@ -176,8 +179,16 @@ fn quantity(frame: &FrameHeader, channel: &str) -> String {
     if let Some(base) = name.strip_prefix(SIGMA) {
         return format!("standard deviation of {base}");
     }
+    if let Some(base) = name.strip_prefix(VARIANCE) {
+        return format!("variance of {base}");
+    }
     if let Some(pair) = name.strip_prefix(COVARIANCE) {
-        return format!("covariance of {pair}");
+        let [first, second] = [&pair[..pair.len() / 2], &pair[pair.len() / 2..]];
+        return if first == second {
+            format!("variance of {first}")
+        } else {
+            format!("covariance of {first} and {second}")
+        };
     }
     if channel == MASK_LAYER {
         return "mask, sum of bits".into();
@@ -216,7 +227,8 @@ fn unit(frame: &FrameHeader, place: usize) -> String {
     if channel == MASK_LAYER || frame.metadata.quantity == QuantityKind::ColorDifference {
         return String::new();
     }
-    let base = channel.strip_prefix(SIGMA).unwrap_or(channel);
+    let base = channel.strip_prefix(SIGMA).or_else(|| channel.strip_prefix(VARIANCE)).unwrap_or(channel);
+    let is_squared = channel.starts_with(COVARIANCE) || channel.starts_with(VARIANCE);
     let units: Vec<&str> = unit.split(", ").collect();
     let own = match frame.geometry.channels.iter().position(|known| bare_name(known) == base) {
         Some(place) if units.len() > 1 => units.get(place).copied().unwrap_or_default(),
@@ -224,8 +236,9 @@ fn unit(frame: &FrameHeader, place: usize) -> String {
     };
     match typeset(own) {
         plain if is_none(&plain) => String::new(),
-        unit if channel.starts_with(COVARIANCE) && unit == "relative" => "relative²".into(),
-        unit if channel.starts_with(COVARIANCE) => format!("({unit})²"),
+        unit if is_squared && unit == "relative" => "relative²".into(),
+        unit if is_squared && unit.chars().all(char::is_alphabetic) => format!("{unit}²"),
+        unit if is_squared => format!("({unit})²"),
         unit => unit,
     }
 }
@@ -358,11 +371,14 @@ mod tests {
             let frame = frame(quantity, channels);
             Choice::of(&frame, Some(name), true).unwrap().label(&frame)
         };
-        let three = ["R", "G", "B", "covariance.XX", "sigma.G", "sigma.B", "mask"];
+        let three = ["R", "G", "B", "covariance.XX", "sigma.G", "sigma.B", "variance.G", "mask"];
         for (quantity, name, wanted) in [
             (QuantityKind::Xyz, "Y", "Y / cd m⁻²"),
             (QuantityKind::Xyz, "sigma.Y", "standard deviation of Y / cd m⁻²"),
-            (QuantityKind::Xyz, "covariance.XX", "covariance of XX / (cd m⁻²)²"),
+            (QuantityKind::Xyz, "covariance.XX", "variance of X / (cd m⁻²)²"),
+            (QuantityKind::Xyz, "variance.Y", "variance of Y / (cd m⁻²)²"),
+            (QuantityKind::Electrons, "variance.G", "variance of G / (e⁻)²"),
+            (QuantityKind::Adu, "variance.G", "variance of G / ADU²"),
             (QuantityKind::Xyz, "mask", "mask, sum of bits"),
             (QuantityKind::Electrons, "G", "electrons, G / e⁻"),
             (QuantityKind::Adu, "sigma.G", "standard deviation of G / ADU"),

@@ -230,7 +230,7 @@ mod tests {
         let complaint = |scene: Scene| scene.render().unwrap_err().to_string();
         assert!(complaint(Scene { patch: Some([2, 2]), ..given([1.0; 3]) }).contains("the scene is uniform"));
         let dark = SignalLevel { dark: true, expose_to: Some(0.5), ..SignalLevel::default() };
-        assert!(complaint(Scene { level: dark, ..Scene::default() }).contains("the scene is dark"));
+        assert!(complaint(Scene { level: dark, ..Scene::default() }).contains("the sensor sees none of its light"));
         let library = spectrum("skies/kider2014.exr").uniform().unwrap_err().to_string();
         assert!(library.contains("choose one with --sample N"), "{library}");
     }

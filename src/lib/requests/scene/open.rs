@@ -62,7 +62,9 @@ impl Scene {
             let (kept, brightest) = light.keep_and_find_brightest()?;
             light = kept;
             if brightest <= 0.0 {
-                return Err(Error::Data("the scene is dark: no exposure reaches a fraction of full well".into()));
+                return Err(Error::Data(
+                    "the sensor sees none of its light: no exposure reaches a fraction of full well".into(),
+                ));
             }
             let full_well_e = loaded.sensor.readout()?.full_well_e;
             exposure.exposure_s = fraction * full_well_e / brightest;

@@ -114,21 +114,31 @@ pub(in crate::requests) fn own_xyz(radiance: &SpectralLibrary) -> Result<[f64; 3
     Ok(std::array::from_fn(|i| xyz[(0, i)]))
 }
 
-/// A warning of wavelengths that are missing: steps much wider than most.
+/// A warning of wavelengths that are missing: steps much wider than most, or most of them wide.
 pub(super) fn gap(sampled_nm: &[f64], name: &str) -> Option<Note> {
     /// Times as wide as most, and nm, from which it is told.
     const WIDE: f64 = 10.0;
     const WIDE_NM: f64 = 20.0;
+    /// Fewer samples are meant as the straight lines that they make.
+    const FEWEST: usize = 4;
     let mut steps: Vec<(f64, f64)> = sampled_nm.windows(2).map(|pair| (pair[1] - pair[0], pair[0])).collect();
     steps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (usual, (widest, from)) = (steps.get(steps.len() / 2)?.0, *steps.last()?);
-    (widest > WIDE * usual && widest >= WIDE_NM).then(|| {
-        Note::Warning(format!(
+    let text = if widest > WIDE * usual && widest >= WIDE_NM {
+        format!(
             "{name}: nothing lies between {from} and {} nm, where its samples are otherwise {usual:.3} nm apart; a straight line is \
              taken there",
             from + widest
-        ))
-    })
+        )
+    } else if usual > WIDE_NM && sampled_nm.len() >= FEWEST {
+        format!(
+            "{name}: its samples are {usual:.3} nm apart, with straight lines between them; where the light is not straight the sums are \
+             off (of a sky every 50 nm by 4 %)"
+        )
+    } else {
+        return None;
+    };
+    Some(Note::Warning(text))
 }
 
 #[cfg(test)]
@@ -145,6 +155,7 @@ mod tests {
         let (low, high) = (360..=480, 620..=830);
         let with_gap: Vec<f64> = low.chain(high).map(f64::from).collect();
         assert!(told(&with_gap).unwrap().starts_with("sky.csv: nothing lies between 480 and 620 nm"));
+        assert!(told(&[350.0, 400.0, 450.0, 500.0]).unwrap().starts_with("sky.csv: its samples are 50.000 nm apart"));
         for whole in [&[400.0, 700.0][..], &[360.0, 460.0, 830.0], &[400.0, 401.0, 402.0, 419.0], &[500.0]] {
             assert_eq!(told(whole), None);
         }
