@@ -140,12 +140,13 @@ impl LevelVariance {
         Self { of, stretches: (0..STEPS / WIDE).map(|_| OnceLock::new()).collect(), told_from }
     }
 
-    /// Whether the variance at a level is known: what takes too long is no number.
-    pub fn is_told(&self, level: f64) -> bool {
+    /// The variance at a level, and whether it is known: what takes too long is no number.
+    pub fn told_at(&self, level: f64) -> (f64, bool) {
+        let variance = self.at(level);
         // What is no level has a neighbor's variance.
         let is_by_code = level < self.told_from;
-        let takes_long = || self.of.photosite.has_tails() && self.at(level).is_nan();
-        !(is_by_code || takes_long())
+        let takes_long = self.of.photosite.has_tails() && variance.is_nan();
+        (variance, !(is_by_code || takes_long))
     }
 
     /// The variance at a level; below zero as at zero, beyond the last as there.
