@@ -34,6 +34,9 @@ const STEPS: usize = 1024;
 /// Steps of a stretch, fewer than a bend at full well extends over.
 const WIDE: usize = 32;
 
+/// Noise in codes below which what rounding does hangs on the fraction of a code, which no pixel's level tells.
+pub(super) const HALF_A_CODE: f64 = 0.5;
+
 /// How far, of itself, the value in the middle of some steps may be off the chord over them so that a parabola tells the others.
 const STRAIGHT: f64 = 1e-4;
 
@@ -101,8 +104,7 @@ impl Variances {
         let electrons = photosite.model.dark_e + expected_e;
         let slope = adc.sample_per_e(electrons);
         let charge = charge::charge(&photosite.model, expected_e).variance + photosite.model.added().powi(2);
-        // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
-        if charge.sqrt() * slope < 0.5 * adc.sample_slope(adc.level_at(electrons)) {
+        if charge.sqrt() * slope < HALF_A_CODE * adc.sample_slope(adc.level_at(electrons)) {
             charge * slope * slope + adc.rounding_at(electrons)
         } else {
             photosite.moments(expected_e).moments.variance

@@ -7,13 +7,14 @@
 use super::charge;
 use super::covariance::Covariance;
 use super::ground::{corrected, quantity_of_sites};
-use super::level_variance::LevelVariance;
+use super::level_variance::{HALF_A_CODE, LevelVariance};
 use super::lines::{DRIFTING, TAPPED_DRIFT};
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::pixel_gains::{PixelGains, phase_at};
 use super::pixel_light::PixelVariances;
 use super::pixel_lines::PixelLines;
+use super::reading::ENDLESS;
 use super::repeated::average_of;
 use super::smooth_hue;
 use super::tapped_axis::Axis;
@@ -388,6 +389,47 @@ fn dark_above(frame: &FrameHeader, codes: &Photosite, adc: &AdcRecord, black_adu
     let short_adu = unlit_adu - black_adu;
     let most_adu = dark_adu + (0.5 * dark_adu).max(0.01 * adc.sample_at(0.0));
     if (0.0..=most_adu).contains(&short_adu) { short_adu } else { 0.0 }
+}
+
+/// Codes that noise does not blur, so that the scatter of a sample hangs on where in a code its level lies, which no sample tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CoarseCodes {
+    /// The level above black up to which noise is below half a code, in ADU.
+    pub up_to_adu: f64,
+    /// The least and the largest standard deviation of samples without light, by where in a code their level lies, in ADU.
+    pub scatter_adu: [f64; 2],
+    /// That which is told of them in ADU, about the level: of what is drawn and of an error of rounding of 1/12 ADU².
+    pub told_adu: f64,
+}
+
+/// How coarse the codes are beside the noise of photosites that [`PixelNoise`] is of; none where noise blurs them, where averages or flat fields
+/// make other samples of them, or where it is not known.
+pub fn coarse_codes(frame: &FrameHeader) -> Option<CoarseCodes> {
+    let (photosite, _) = photosite_of(&taps::as_if_one(frame)).ok()?;
+    let adc = photosite.adc.filter(|adc| !adc.is_bent())?;
+    if frame.metadata.average.is_some() || photosite.flat.is_some() {
+        return None;
+    }
+    let (model, slope) = (&photosite.model, adc.adu_per_e);
+    let std = |level: f64| slope * charge::charge(model, level / slope).variance.max(0.0).sqrt().hypot(model.added());
+    let unlit = std(0.0);
+    if unlit.is_nan() || unlit >= HALF_A_CODE {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, slope * model.full_well_e);
+    if std(high) < HALF_A_CODE {
+        low = high;
+    }
+    for _ in 0..60 {
+        let middle = f64::midpoint(low, high);
+        (low, high) = if std(middle) < HALF_A_CODE { (middle, high) } else { (low, middle) };
+    }
+    let scatter = |place: f64| {
+        let [first, second, ..] = ENDLESS.moments(place, unlit, 0.0);
+        (second - first * first).max(0.0).sqrt()
+    };
+    let told_adu = (unlit * unlit + 1.0 / 12.0).sqrt();
+    Some(CoarseCodes { up_to_adu: low, scatter_adu: [0.0, 0.5].map(scatter), told_adu })
 }
 
 /// The level above black below which the green of a frame demosaicked by smooth hue transition is less than
