@@ -250,17 +250,6 @@ impl Photosite {
         Ok(self.regime(expected_e)? == Regime::Curved)
     }
 
-    /// Whether one photosite in 10¹³ or more of these signals follows what its line has on a curve, so that some lines scatter by less than
-    /// others; samples over a flat field are not told.
-    pub(super) fn bends_lines(&self, expected_e: [f64; 3]) -> Predicted<bool> {
-        if !self.has_lines() || self.flat.is_some() {
-            return Ok(false);
-        }
-        let ends = |adc: AdcRecord| expected_e.iter().any(|light_e| !Law::of(&self.model, *light_e).is_within(&adc));
-        let is_corrected = self.darks[0].is_some();
-        Ok(self.is_curved_in_lines(expected_e)? || is_corrected && self.adc.is_some_and(ends))
-    }
-
     /// What is shared as each class has it, with the part of the drift by such slopes to the charge.
     fn by_class(&self, row: &Matrix3<f64>, column: &Matrix3<f64>, slopes: [f64; 3]) -> [LineCovariance; 3] {
         let [drift, drift_rows] = [self.drift_e2(None), self.drift_rows()];

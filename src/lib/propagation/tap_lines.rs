@@ -8,12 +8,13 @@
 //! and so for columns. Where codes follow straight each has its own slope, g_ak g_bl \[σ² + E_k E_l s²].
 
 use super::bent_lines::BentLine;
+use super::law::Law;
 use super::line_sums::{bent, curved};
 use super::lines::{Axis, TAPPED_DRIFT};
 use super::moments::Prediction;
 use super::photosite::Photosite;
 use super::unpredictable::{Predicted, Unpredictable};
-use crate::metadata::AverageRecord;
+use crate::metadata::{AdcRecord, AverageRecord};
 use nalgebra::{DMatrix, Matrix3};
 
 /// Photosites of an amplifier, and the signal electrons that R, G and B of them expect.
@@ -99,6 +100,19 @@ impl TapLines {
     }
 }
 
+impl Photosite {
+    /// Whether one photosite in 10¹³ or more of these signals follows what its line has on a curve, so that some lines scatter by less than
+    /// others; samples over a flat field are not told.
+    pub(super) fn bends_lines(&self, expected_e: [f64; 3]) -> Predicted<bool> {
+        if !self.has_lines() || self.flat.is_some() {
+            return Ok(false);
+        }
+        let ends = |adc: AdcRecord| expected_e.iter().any(|light_e| !Law::of(&self.model, *light_e).is_within(&adc));
+        let is_corrected = self.darks[0].is_some();
+        Ok(self.is_curved_in_lines(expected_e)? || is_corrected && self.adc.is_some_and(ends))
+    }
+}
+
 /// How photosites of lines go together beyond their covariances, where some of them follow what these have on a curve.
 fn bent_lines(sites: &[Lit]) -> Predicted<[Option<BentLine>; 2]> {
     let bends = sites.iter().map(|(photosite, expected_e)| photosite.bends_lines(*expected_e));
@@ -108,7 +122,12 @@ fn bent_lines(sites: &[Lit]) -> Predicted<[Option<BentLine>; 2]> {
     // What comes off adds to what is shared alone.
     let codes: Vec<Lit> =
         sites.iter().map(|(photosite, expected_e)| (photosite.less_dark_frames(0), *expected_e)).collect();
-    let [row, column] = Axis::ALL.map(|axis| bent(&codes, axis));
+    let found = Axis::ALL.map(|axis| bent(&codes, axis));
+    if sites.iter().any(|(photosite, _)| photosite.darks[0].is_some()) {
+        // Of these less is known, and lines are taken to be straight.
+        return Ok(found.map(|line| line.ok().flatten()));
+    }
+    let [row, column] = found;
     Ok([row?, column?])
 }
 

@@ -33,13 +33,22 @@ impl Known {
         if let Some((_, known)) = self.regions.iter().find(|(of, _)| *of == region) {
             return Arc::clone(known);
         }
-        let found = Arc::new(propagation::of_samples(&region.header(frame), self.equations));
+        let found = Arc::new(of_samples(frame, region, self.equations));
         if let Ok(FramePrediction::Tapped(pixels)) = &*found {
             pixels.sampling();
         }
         self.regions.push((region, Arc::clone(&found)));
         found
     }
+}
+
+/// What is predicted of the samples of a region of a frame; pixels that do not say where they were mirrored were so at its edges.
+fn of_samples(frame: &FrameHeader, region: Region, equations: Equations) -> Result<FramePrediction, Unpredictable> {
+    let mut header = region.header(frame);
+    if let Some(record) = header.metadata.demosaic.as_mut().filter(|_| frame.taps().is_none()) {
+        record.plane.get_or_insert(frame.geometry.on_sensor());
+    }
+    propagation::of_samples(&header, equations)
 }
 
 impl Laws {
@@ -51,7 +60,7 @@ impl Laws {
             let prediction = propagation::of_frame(frame, equations);
             let has_lines = prediction.as_ref().is_ok_and(FramePrediction::has_lines);
             let is_by_place = |found| matches!(found, FramePrediction::Groups(_) | FramePrediction::Tapped(_));
-            let is_bent = has_lines && propagation::of_samples(frame, equations).is_ok_and(is_by_place);
+            let is_bent = has_lines && of_samples(frame, Region::whole(frame), equations).is_ok_and(is_by_place);
             Known { prediction, samplings: Samplings::default(), is_bent, regions: Vec::new(), head, equations }
         }))
     }
