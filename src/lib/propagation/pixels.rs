@@ -417,6 +417,10 @@ pub fn coarse_codes(frame: &FrameHeader) -> Option<CoarseCodes> {
         return None;
     }
     let (mut low, mut high) = (0.0, slope * model.full_well_e);
+    // A frame without noise is meant to have none.
+    if std(high) <= 0.0 {
+        return None;
+    }
     if std(high) < HALF_A_CODE {
         low = high;
     }
