@@ -5,7 +5,7 @@ use crate::metadata::FrameHeader;
 use crate::propagation::budget::{Budget, Cause};
 use crate::propagation::frame::{FixedPart, Predicted, Sites};
 use crate::propagation::gains;
-use crate::propagation::tapped::OverExposures;
+use crate::propagation::tapped::TapMoments;
 use crate::propagation::{Equations, FramePrediction, PixelMoments, TappedPixels};
 use nalgebra::Matrix3;
 
@@ -16,7 +16,7 @@ pub(super) enum Causes {
     /// The same with what of the pixels that are made of them is the same in every exposure.
     Pixels(Box<([Budget; 3], FixedPart)>),
     /// The same behind each amplifier, and the means that their photosites have over exposures.
-    Taps(Vec<(usize, [Budget; 3])>, Box<OverExposures>),
+    Taps(Vec<(usize, [Budget; 3])>, Box<TapMoments>),
 }
 
 impl Causes {
@@ -119,7 +119,7 @@ fn curving(causes: &[Budget; 3]) -> Cause {
 fn of_tapped(
     pixels: &TappedPixels,
     budgets: &[(usize, [Budget; 3])],
-    means: &OverExposures,
+    means: &TapMoments,
     covariance: &Matrix3<f64>,
 ) -> Vec<CauseVariance> {
     let of_tap = |tap: usize| budgets.iter().find(|(of, _)| *of == tap);

@@ -15,7 +15,7 @@ use super::repeated;
 use super::spaces::{Channels, Curved, OTHER_COLORS, is_curved, white};
 use super::tails;
 use super::tap_lines::{Lit, TapLines};
-use super::tapped::{OverExposures, TappedPixels};
+use super::tapped::{TapMoments, TappedPixels};
 use super::taps::{self, Group, TappedSites};
 use super::unpredictable::{OFFSETS_TOO_LONG, TOO_LONG};
 pub use super::unpredictable::{Predicted, Unpredictable};
@@ -106,6 +106,42 @@ pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePre
         FramePrediction::Planes(_) | FramePrediction::Groups(_) | FramePrediction::Tapped(_) => {}
     }
     Ok(prediction)
+}
+
+/// The same for how samples scatter: where photosites follow what their rows and columns share on a curve, by their places, as those of
+/// several amplifiers are told, which [`of_frame`] does not tell apart. So are pixels but for those by smooth hue transition.
+///
+/// # Errors
+///
+/// As [`of_frame`].
+pub fn of_samples(frame: &FrameHeader, equations: Equations) -> Predicted<FramePrediction> {
+    let found = of_frame(frame, equations)?;
+    if frame.metadata.average.is_some() || !found.has_lines() {
+        return Ok(found);
+    }
+    let sites = Sites::of(frame, equations)?;
+    if !sites.photosite.bends_lines(sites.expected_e)? {
+        return Ok(found);
+    }
+    let by_places = match &found {
+        FramePrediction::Planes(moments) => {
+            taps::one_group(frame, &sites.lit(), *moments)?.map(FramePrediction::Groups)
+        }
+        _ => tapped(frame, equations).ok().map(|pixels| FramePrediction::Tapped(Box::new(pixels))),
+    };
+    Ok(by_places.unwrap_or(found))
+}
+
+impl FramePrediction {
+    /// Whether photosites of rows or columns share something, of a frame that one amplifier has read.
+    pub fn has_lines(&self) -> bool {
+        let sites = match self {
+            Self::Planes(sites) => sites,
+            Self::Pixels(pixels) => &pixels.sites,
+            Self::Groups(_) | Self::Tapped(_) => return false,
+        };
+        sites.iter().any(|site| site.lines != LineCovariance::default())
+    }
 }
 
 /// What of the covariance of the channels of a pixel is the same in every exposure.
@@ -205,11 +241,11 @@ impl Sites {
     pub fn over_exposures(
         taps: &[(usize, [f64; 3], Self)],
         means: &[(usize, [Prediction; 3])],
-    ) -> Predicted<OverExposures> {
+    ) -> Predicted<TapMoments> {
         let lit: Vec<Lit> = taps.iter().map(|(_, _, sites)| sites.lit()).collect();
         let has_lines = lit.iter().any(|(photosite, _)| photosite.has_lines());
         let lines = if has_lines { Some(TapLines::fixed(&lit)?) } else { None };
-        Ok(OverExposures::of(means, lines.as_ref()))
+        Ok(TapMoments::of(means, lines.as_ref()))
     }
 
     /// Predicts a frame that was made of these photosites; pixels say where their moments are void.

@@ -34,6 +34,9 @@ const STEPS: usize = 1024;
 /// Steps of a stretch, fewer than a bend at full well extends over.
 const WIDE: usize = 32;
 
+/// Noise in codes below which what rounding does hangs on the fraction of a code, which no pixel's level tells.
+pub(super) const HALF_A_CODE: f64 = 0.5;
+
 /// How far, of itself, the value in the middle of some steps may be off the chord over them so that a parabola tells the others.
 const STRAIGHT: f64 = 1e-4;
 
@@ -101,8 +104,7 @@ impl Variances {
         let electrons = photosite.model.dark_e + expected_e;
         let slope = adc.sample_per_e(electrons);
         let charge = charge::charge(&photosite.model, expected_e).variance + photosite.model.added().powi(2);
-        // Below half a code what rounding does hangs on the fraction of a code, which no pixel's level tells.
-        if charge.sqrt() * slope < 0.5 * adc.sample_slope(adc.level_at(electrons)) {
+        if charge.sqrt() * slope < HALF_A_CODE * adc.sample_slope(adc.level_at(electrons)) {
             charge * slope * slope + adc.rounding_at(electrons)
         } else {
             photosite.moments(expected_e).moments.variance
@@ -140,12 +142,13 @@ impl LevelVariance {
         Self { of, stretches: (0..STEPS / WIDE).map(|_| OnceLock::new()).collect(), told_from }
     }
 
-    /// Whether the variance at a level is known: what takes too long is no number.
-    pub fn is_told(&self, level: f64) -> bool {
+    /// The variance at a level, and whether it is known: what takes too long is no number.
+    pub fn told_at(&self, level: f64) -> (f64, bool) {
+        let variance = self.at(level);
         // What is no level has a neighbor's variance.
         let is_by_code = level < self.told_from;
-        let takes_long = || self.of.photosite.has_tails() && self.at(level).is_nan();
-        !(is_by_code || takes_long())
+        let takes_long = self.of.photosite.has_tails() && variance.is_nan();
+        (variance, !(is_by_code || takes_long))
     }
 
     /// The variance at a level; below zero as at zero, beyond the last as there.

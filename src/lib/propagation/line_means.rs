@@ -1,11 +1,12 @@
-//! The mean sample of the photosites of a line, by what is added to their charge, where photosites are unlike each other.
+//! The mean sample of the photosites of a line, and the mean of its square, by what is added to their charge, where photosites are unlike
+//! each other.
 //!
 //! Of hot photosites and others it is the mean over all kinds, M(v). Whether a reading jumps does not hang on its charge, and a jump is
 //! added to that as v is, so that of shares s of amplitude a
 //!
 //! m(v) = (1 − Σ s) M(v) + Σ s \[M(v − a) + 2 M(v) + M(v + a)]/4
 //!
-//! M is worked out at even distances only, and only where an end of the codes is within reach: elsewhere it is straight, or constant.
+//! and so the mean of the square. M is worked out at even distances only, and only where an end of the codes is within reach: elsewhere it is straight, or constant.
 
 use super::law::Law;
 use super::reading::{Reading, codes_of};
@@ -41,6 +42,14 @@ impl Kinds {
     }
 }
 
+/// The mean of a sample about a center, and of its square.
+type Pair = [f64; 2];
+
+/// Adds so much of a pair.
+fn add(sum: &mut Pair, times: f64, pair: Pair) {
+    sum.iter_mut().zip(pair).for_each(|(sum, of)| *sum += times * of);
+}
+
 /// The photosites of a class in one line.
 pub(super) struct LineMeans {
     kinds: Vec<Kind>,
@@ -50,15 +59,16 @@ pub(super) struct LineMeans {
     /// Charges at which the codes end.
     ends_e: [f64; 2],
     spacing_e: f64,
-    known: RefCell<BTreeMap<i64, f64>>,
+    known: RefCell<BTreeMap<i64, Pair>>,
 }
 
 /// Photosites that are alike.
 struct Kind {
     share: f64,
     law: Law,
-    /// The mean charge, what is beyond full well left out; none where something of how codes are rounded is left.
-    charge_e: Option<f64>,
+    /// Mean and variance of the charge, what is beyond full well left out, with what is added as it is read; none where something of how
+    /// codes are rounded is left.
+    charge_e: Option<Pair>,
     /// The least and the largest that is read, but for what is added.
     reach_e: [f64; 2],
 }
@@ -70,12 +80,16 @@ impl LineMeans {
         let is_smooth = adc.is_none_or(|adc| adc.linearization.is_none() && adc.adu_per_e * blur_e >= STRAIGHT);
         let kind = |(share, law): &(f64, Law)| {
             let electrons = law.of_electrons();
+            let charge_e = || {
+                let [first, second, ..] = law.expect(&electrons);
+                [first + electrons.center, second - first * first]
+            };
             let [least, most] = law.extent().map(|charge| charge.min(law.full_well_e));
             let noise_e = REACH * law.read_noise_e;
             Kind {
                 share: *share,
                 law: *law,
-                charge_e: is_smooth.then(|| law.expect(&electrons)[0] + electrons.center),
+                charge_e: is_smooth.then(charge_e),
                 reach_e: [least - noise_e, most + noise_e],
             }
         };
@@ -92,21 +106,24 @@ impl LineMeans {
         }
     }
 
-    /// The mean where so much is added to the charge.
-    pub fn at(&self, offset_e: f64) -> f64 {
+    /// The mean about the center where so much is added to the charge, and that of the square.
+    pub fn at(&self, offset_e: f64) -> Pair {
         if self.jumps.is_empty() {
             return self.quiet(offset_e);
         }
         let middle = self.looked_up(offset_e);
-        let jump = |(share, amplitude_e): &(f64, f64)| {
-            let sides = self.looked_up(offset_e - amplitude_e) + self.looked_up(offset_e + amplitude_e);
-            share * (0.25 * sides - 0.5 * middle)
-        };
-        middle + self.jumps.iter().map(jump).sum::<f64>()
+        let mut found = middle;
+        for (share, amplitude_e) in &self.jumps {
+            for side_e in [-amplitude_e, *amplitude_e] {
+                add(&mut found, 0.25 * share, self.looked_up(offset_e + side_e));
+            }
+            add(&mut found, -0.5 * share, middle);
+        }
+        found
     }
 
     /// M at a place, by those at even distances around it.
-    fn looked_up(&self, offset_e: f64) -> f64 {
+    fn looked_up(&self, offset_e: f64) -> Pair {
         let place = offset_e / self.spacing_e;
         let below = place.floor();
         let t = place - below;
@@ -119,29 +136,38 @@ impl LineMeans {
         if t == 0.0 {
             return value(first + POINTS as i64 / 2 - 1);
         }
-        let (mut sum, mut all) = (0.0, 0.0);
+        let (mut sum, mut all) = ([0.0; 2], 0.0);
         // Barycentric: (−1)ʲ C(7, j).
         let mut binomial = 1.0;
         for point in 0..POINTS {
             let distance = t + (POINTS / 2 - 1) as f64 - point as f64;
             let weight = binomial / distance;
-            sum += weight * value(first + point as i64);
+            add(&mut sum, weight, value(first + point as i64));
             all += weight;
             binomial *= -((POINTS - 1 - point) as f64) / (point + 1) as f64;
         }
-        sum / all
+        sum.map(|sum| sum / all)
     }
 
     /// M, by each kind.
-    fn quiet(&self, offset_e: f64) -> f64 {
+    fn quiet(&self, offset_e: f64) -> Pair {
         let reading = self.reading.off_by(offset_e);
         let [lower, upper] = self.ends_e;
         let is_within = |[low, high]: [f64; 2]| self.adc.is_none() || low + offset_e > lower && high + offset_e < upper;
-        let mean = |kind: &Kind| match (kind.charge_e.filter(|_| is_within(kind.reach_e)), self.adc) {
-            (Some(charge_e), None) => charge_e - reading.center + offset_e,
-            (Some(charge_e), Some(adc)) => adc.sample(adc.level_at(charge_e + offset_e)) - reading.center,
-            (None, _) => kind.law.expect(&reading)[0],
+        let about = |mean: f64, variance: f64| [mean, variance + mean * mean];
+        let pair = |kind: &Kind| match (kind.charge_e.filter(|_| is_within(kind.reach_e)), self.adc) {
+            (Some([charge_e, variance]), None) => about(charge_e - reading.center + offset_e, variance),
+            (Some([charge_e, variance]), Some(adc)) => {
+                let mean = adc.sample(adc.level_at(charge_e + offset_e)) - reading.center;
+                about(mean, adc.adu_per_e * adc.adu_per_e * variance + 1.0 / 12.0)
+            }
+            (None, _) => {
+                let [first, second, ..] = kind.law.expect(&reading);
+                [first, second]
+            }
         };
-        self.kinds.iter().map(|kind| kind.share * mean(kind)).sum()
+        let mut found = [0.0; 2];
+        self.kinds.iter().for_each(|kind| add(&mut found, kind.share, pair(kind)));
+        found
     }
 }

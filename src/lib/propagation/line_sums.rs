@@ -5,6 +5,7 @@
 //! less the charge, or each count of it, and the sum over v has panels between them. Of u it is smooth even then, as far as shot
 //! noise, or what is added, blurs it.
 
+use super::bent_lines::{BentLine, Given};
 use super::blur::blur_e;
 use super::effort;
 use super::law::Law;
@@ -101,60 +102,83 @@ impl Photosite {
 /// # Errors
 ///
 /// [`Unpredictable::Beyond`] where they are too many.
-pub(super) fn curved(sites: &[(Photosite, [f64; 3])], axes: &[Axis]) -> Predicted<DMatrix<f64>> {
-    let are_unlike = sites.iter().any(|(site, _)| site.has_tails());
-    let most_work = if are_unlike { MOST_WORK_OF_UNLIKE } else { MOST_WORK };
-    let found = effort::within(most_work, || curved_within(sites, axes));
-    found.unwrap_or(Err(Unpredictable::Beyond(TAKES_LONG)))
-}
-
-fn curved_within(sites: &[(Photosite, [f64; 3])], axes: &[Axis]) -> Predicted<DMatrix<f64>> {
+pub(super) fn curved(sites: &[Lit], axes: &[Axis]) -> Predicted<DMatrix<f64>> {
     let shared = Shared::of(sites, axes);
     let count = shared.classes.len();
-    if shared.offset_e == 0.0 && shared.response == 0.0 {
-        return Ok(DMatrix::zeros(count, count));
-    }
-    let mut gains = shared.gains(false)?;
-    let smooth = nodes(shared.offset_e, shared.least_blur_e());
-    let are_many = smooth.len() * gains.len() > MOST_NODES;
-    let is_sharp = are_many && shared.classes.iter().all(|class| class.adc.is_some());
-    if is_sharp && sites.iter().any(|(site, _)| site.has_tails()) {
-        return Err(Unpredictable::Beyond(COARSE_LINES));
-    }
-    if is_sharp {
-        gains = shared.gains(true)?;
-    } else if are_many {
-        return Err(Unpredictable::Beyond(TOO_COARSE));
-    }
     let (mut first, mut second) = (DVector::zeros(count), DMatrix::zeros(count, count));
-    let mut all = 0;
-    let mut foreseen: Option<effort::Foreseen> = None;
-    let lines = gains.len();
-    for (u, of_u) in gains {
-        let share = 1.0 + shared.response * u;
-        let gained: Vec<Kinds> = shared.classes.iter().map(|class| class.kinds.gained(share)).collect();
-        let means = shared.line(&gained);
-        let offsets = if is_sharp { &shared.offsets(&gained)? } else { &smooth };
-        all += offsets.len();
-        if all > MOST_STEPPED {
-            return Err(Unpredictable::Beyond(TOO_COARSE));
-        }
-        let foreseen = foreseen.get_or_insert_with(|| effort::Foreseen::of(lines * offsets.len()));
-        for (v, of_v) in offsets {
-            foreseen.begin_next();
-            if effort::is_spent() {
-                return Err(Unpredictable::Beyond(TAKES_LONG));
-            }
-            let means = shared.means(&means, shared.offset_e * v);
-            first += of_u * of_v * &means;
-            second += of_u * of_v * &means * means.transpose();
-        }
-    }
+    shared.each_value(sites, |weight, [means, _]| {
+        second += weight * &means * means.transpose();
+        first += weight * means;
+    })?;
     Ok(second - &first * first.transpose())
 }
 
+/// How photosites of a line go together beyond their covariance; none where they share nothing.
+///
+/// # Errors
+///
+/// As [`curved`].
+pub(super) fn bent(sites: &[Lit], axis: Axis) -> Predicted<Option<BentLine>> {
+    let mut given = Vec::new();
+    Shared::of(sites, &[axis]).each_value(sites, |weight, [means, squares]| {
+        given.push(Given { weight, variances: squares - means.component_mul(&means), means });
+    })?;
+    Ok(BentLine::of(given))
+}
+
+/// Photosites behind an amplifier, and the signal electrons that R, G and B of them expect.
+type Lit = (Photosite, [f64; 3]);
+
 impl Shared {
-    fn of(sites: &[(Photosite, [f64; 3])], axes: &[Axis]) -> Self {
+    /// Goes through what is shared: how likely it is, and what it makes of the means of all classes and of their squares.
+    fn each_value(&self, sites: &[Lit], of: impl FnMut(f64, [DVector<f64>; 2])) -> Predicted<()> {
+        let are_unlike = sites.iter().any(|(site, _)| site.has_tails());
+        let most_work = if are_unlike { MOST_WORK_OF_UNLIKE } else { MOST_WORK };
+        let found = effort::within(most_work, || self.each_within(are_unlike, of));
+        found.unwrap_or(Err(Unpredictable::Beyond(TAKES_LONG)))
+    }
+
+    fn each_within(&self, are_unlike: bool, mut of: impl FnMut(f64, [DVector<f64>; 2])) -> Predicted<()> {
+        if self.offset_e == 0.0 && self.response == 0.0 {
+            return Ok(());
+        }
+        let mut gains = self.gains(false)?;
+        let smooth = nodes(self.offset_e, self.least_blur_e());
+        let are_many = smooth.len() * gains.len() > MOST_NODES;
+        let is_sharp = are_many && self.classes.iter().all(|class| class.adc.is_some());
+        if is_sharp && are_unlike {
+            return Err(Unpredictable::Beyond(COARSE_LINES));
+        }
+        if is_sharp {
+            gains = self.gains(true)?;
+        } else if are_many {
+            return Err(Unpredictable::Beyond(TOO_COARSE));
+        }
+        let mut all = 0;
+        let mut foreseen: Option<effort::Foreseen> = None;
+        let lines = gains.len();
+        for (u, of_u) in gains {
+            let share = 1.0 + self.response * u;
+            let gained: Vec<Kinds> = self.classes.iter().map(|class| class.kinds.gained(share)).collect();
+            let line = self.line(&gained);
+            let offsets = if is_sharp { &self.offsets(&gained)? } else { &smooth };
+            all += offsets.len();
+            if all > MOST_STEPPED {
+                return Err(Unpredictable::Beyond(TOO_COARSE));
+            }
+            let foreseen = foreseen.get_or_insert_with(|| effort::Foreseen::of(lines * offsets.len()));
+            for (v, of_v) in offsets {
+                foreseen.begin_next();
+                if effort::is_spent() {
+                    return Err(Unpredictable::Beyond(TAKES_LONG));
+                }
+                of(of_u * of_v, self.means(&line, self.offset_e * v));
+            }
+        }
+        Ok(())
+    }
+
+    fn of(sites: &[Lit], axes: &[Axis]) -> Self {
         let mut shared = Self { offset_e: 0.0, response: 0.0, classes: Vec::new() };
         if let Some((site, _)) = sites.first() {
             for axis in axes {
@@ -188,11 +212,13 @@ impl Shared {
         self.classes.iter().enumerate().map(of_class).collect()
     }
 
-    /// Their mean samples, where so much is added.
-    fn means(&self, line: &[Option<LineMeans>], offset_e: f64) -> DVector<f64> {
-        let mut found = DVector::zeros(self.classes.len());
+    /// Their mean samples, and those of the squares, where so much is added.
+    fn means(&self, line: &[Option<LineMeans>], offset_e: f64) -> [DVector<f64>; 2] {
+        let mut found = [0, 1].map(|_| DVector::zeros(self.classes.len()));
         for (k, means) in line.iter().enumerate() {
-            found[k] = means.as_ref().map_or(found[self.classes[k].same], |means| means.at(offset_e));
+            let same = self.classes[k].same;
+            let pair = means.as_ref().map_or([found[0][same], found[1][same]], |means| means.at(offset_e));
+            (0..2).for_each(|power| found[power][k] = pair[power]);
         }
         found
     }

@@ -7,6 +7,7 @@
 mod amplitudes;
 mod anew;
 mod bent;
+pub mod bent_lines;
 mod blur;
 pub mod budget;
 mod charge;
@@ -61,6 +62,7 @@ mod tails;
 pub mod tap_lines;
 pub mod tapped;
 mod tapped_axis;
+mod tapped_bent;
 mod tapped_factors;
 mod tapped_sampling;
 mod tapped_shares;
@@ -69,7 +71,7 @@ mod unlike;
 mod unpredictable;
 
 pub use exposures::Repeated;
-pub use frame::{FramePrediction, Unpredictable, of_frame};
+pub use frame::{FramePrediction, Unpredictable, of_frame, of_samples};
 pub use moments::{Equations, LineCovariance, Prediction, SiteCovariance};
 pub use photosite::Photosite;
 pub use pixel_moments::PixelMoments;

@@ -58,20 +58,22 @@ impl PixelVariances {
         uneven.illumination.at([on_sensor(0), on_sensor(1)])
     }
 
-    /// The variances of R, G and B at such levels of codes above black, where such a share of light fell on the flat field.
-    pub fn at(&self, level: [f64; 3], share: f64) -> [f64; 3] {
-        std::array::from_fn(|class| {
-            let brightest = self.brightest[class].at(level[class]);
+    /// The variances of R, G and B at such levels of codes above black, where such a share of light fell on the flat field, and whether they
+    /// are known.
+    pub fn at(&self, level: [f64; 3], share: f64) -> ([f64; 3], bool) {
+        let mut are_told = true;
+        let mut look_up = |variances: &[LevelVariance; 3], class: usize| {
+            let (variance, is_told) = variances[class].told_at(level[class]);
+            are_told &= is_told;
+            variance
+        };
+        let variances = std::array::from_fn(|class| {
+            let brightest = look_up(&self.brightest, class);
             let Some(Uneven { inverses: [from, to], darkest, .. }) = &self.uneven else { return brightest };
             let part = if to > from { (share.recip() - from) / (to - from) } else { 0.0 };
-            brightest + part * (darkest[class].at(level[class]) - brightest)
-        })
-    }
-
-    /// Whether the variances at such levels of codes are known.
-    pub fn are_told(&self, level: [f64; 3]) -> bool {
-        let all = || self.uneven.iter().map(|uneven| &uneven.darkest).chain([&self.brightest]);
-        (0..3).all(|class| all().all(|variances| variances[class].is_told(level[class])))
+            brightest + part * (look_up(darkest, class) - brightest)
+        });
+        (variances, are_told)
     }
 }
 

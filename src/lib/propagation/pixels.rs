@@ -7,13 +7,14 @@
 use super::charge;
 use super::covariance::Covariance;
 use super::ground::{corrected, quantity_of_sites};
-use super::level_variance::LevelVariance;
+use super::level_variance::{HALF_A_CODE, LevelVariance};
 use super::lines::{DRIFTING, TAPPED_DRIFT};
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::pixel_gains::{PixelGains, phase_at};
 use super::pixel_light::PixelVariances;
 use super::pixel_lines::PixelLines;
+use super::reading::ENDLESS;
 use super::repeated::average_of;
 use super::smooth_hue;
 use super::tapped_axis::Axis;
@@ -183,8 +184,8 @@ impl PixelNoise {
             None => None,
         };
         let kinds: Vec<[usize; 2]> = places().collect();
-        let slopes = relative_slopes(frame);
-        let gain = |place: [isize; 2]| slopes.as_ref().map_or(1.0, |slopes| slopes(place));
+        let tap = tap_of_place(frame).filter(|_| frame.taps().is_some());
+        let gain = |place: [isize; 2]| tap.as_ref().map_or(1.0, |tap| relative_slope(frame, tap(place)));
         let of_lines = photosite
             .has_lines()
             .then(|| PixelLines::of(photosite, average.as_ref(), table, &kinds, &frame.geometry, gain));
@@ -236,8 +237,8 @@ impl PixelNoise {
             covariance.map(|covariance| covariance / (share * share))
         };
         let of_any_tap = || of_taps.iter().flat_map(|(_, whole)| whole);
-        let is_told = self.variances.are_told(level) && of_any_tap().all(|variance| !variance.is_nan());
-        let mut variances = self.variances.at(level, share);
+        let (mut variances, are_told) = self.variances.at(level, share);
+        let is_told = are_told && of_any_tap().all(|variance| !variance.is_nan());
         for (index, of_tap) in of_any_tap().enumerate() {
             variances[index % 3] = variances[index % 3].max(*of_tap);
         }
@@ -274,15 +275,16 @@ fn places(frame: &FrameHeader, reach: usize) -> [Places; 2] {
 const BENT_TAPS: &str = "its rows or columns share noise, several amplifiers (`taps` of the sensor) read them, and the curve of the converter \
                          (`linearization`) bends what each makes of it";
 
-/// The gain of what reads a place of a frame, of codes of a sensor that is read through several amplifiers.
-fn relative_slopes(frame: &FrameHeader) -> Option<impl Fn([isize; 2]) -> f64 + '_> {
-    let (readout, taps) = (frame.readout().ok()?, frame.taps()?);
+/// The slope of what an amplifier makes of the samples of a frame, relative to that of the sensor.
+fn relative_slope(frame: &FrameHeader, tap: usize) -> f64 {
     let are_codes = quantity_of_sites(frame) == QuantityKind::Adu;
-    let origin = frame.geometry.origin.map(i64::from);
-    Some(move |place: [isize; 2]| match are_codes {
-        true => taps.gain(readout.tap([0, 1].map(|axis| origin[axis] + place[axis] as i64))),
-        false => 1.0,
-    })
+    frame.taps().filter(|_| are_codes).map_or(1.0, |taps| taps.gain(tap))
+}
+
+/// What reads the photosite of a place of a frame, counted from the frame's first.
+fn tap_of_place(frame: &FrameHeader) -> Option<impl Fn([isize; 2]) -> usize + '_> {
+    let (readout, origin) = (frame.readout().ok()?, frame.geometry.origin.map(i64::from));
+    Some(move |place: [isize; 2]| readout.tap([0, 1].map(|axis| origin[axis] + place[axis] as i64)))
 }
 
 /// What each amplifier makes of the photosites of pixels at such examples of all places.
@@ -302,16 +304,14 @@ fn pixel_taps(
     if one.flat.is_some() {
         return Err(frame.refuse(taps::FLATTENED));
     }
-    let readout = frame.readout()?;
-    let geometry = &frame.geometry;
-    let tap = |place: [isize; 2]| readout.tap([0, 1].map(|axis| i64::from(geometry.origin[axis]) + place[axis] as i64));
-    let gains = examples.into_iter().map(|at| PixelGains::of_taps(table, at, geometry, tap)).collect();
+    let tap = tap_of_place(frame).ok_or_else(|| frame.missing("sensor.readout"))?;
+    let gains = examples.into_iter().map(|at| PixelGains::of_taps(table, at, &frame.geometry, &tap)).collect();
     let (mut variances, mut shifts, mut slopes) = (Vec::new(), Vec::new(), Vec::new());
     for tap in 0..frame.taps().map_or(0, Taps::count) {
         let (photosite, _) = photosite_of(&taps::of_tap(frame, tap))?;
         photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
         let largest = photosite.model.full_well_e * photosite.slope();
-        slopes.push(photosite.slope() / one.slope());
+        slopes.push(relative_slope(frame, tap));
         shifts.push(photosite.moments(0.0).moments.mean - one.moments(0.0).moments.mean);
         variances.push(LevelVariance::of_classes(&photosite, average, largest));
     }
@@ -388,6 +388,51 @@ fn dark_above(frame: &FrameHeader, codes: &Photosite, adc: &AdcRecord, black_adu
     let short_adu = unlit_adu - black_adu;
     let most_adu = dark_adu + (0.5 * dark_adu).max(0.01 * adc.sample_at(0.0));
     if (0.0..=most_adu).contains(&short_adu) { short_adu } else { 0.0 }
+}
+
+/// Codes that noise does not blur, so that the scatter of a sample hangs on where in a code its level lies, which no sample tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CoarseCodes {
+    /// The level above black up to which noise is below half a code, in ADU.
+    pub up_to_adu: f64,
+    /// The least and the largest standard deviation of samples without light, by where in a code their level lies, in ADU.
+    pub scatter_adu: [f64; 2],
+    /// That which is told of them in ADU, about the level: of what is drawn and of an error of rounding of 1/12 ADU².
+    pub told_adu: f64,
+}
+
+/// How coarse the codes are beside the noise of photosites that [`PixelNoise`] is of; none where noise blurs them, where averages or flat fields
+/// make other samples of them, or where it is not known.
+pub fn coarse_codes(frame: &FrameHeader) -> Option<CoarseCodes> {
+    let (photosite, _) = photosite_of(&taps::as_if_one(frame)).ok()?;
+    let adc = photosite.adc.filter(|adc| !adc.is_bent())?;
+    if frame.metadata.average.is_some() || photosite.flat.is_some() {
+        return None;
+    }
+    let (model, slope) = (&photosite.model, adc.adu_per_e);
+    let std = |level: f64| slope * charge::charge(model, level / slope).variance.max(0.0).sqrt().hypot(model.added());
+    let unlit = std(0.0);
+    if unlit.is_nan() || unlit >= HALF_A_CODE {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, slope * model.full_well_e);
+    // A frame without noise is meant to have none.
+    if std(high) <= 0.0 {
+        return None;
+    }
+    if std(high) < HALF_A_CODE {
+        low = high;
+    }
+    for _ in 0..60 {
+        let middle = f64::midpoint(low, high);
+        (low, high) = if std(middle) < HALF_A_CODE { (middle, high) } else { (low, middle) };
+    }
+    let scatter = |place: f64| {
+        let [first, second, ..] = ENDLESS.moments(place, unlit, 0.0);
+        (second - first * first).max(0.0).sqrt()
+    };
+    let told_adu = (unlit * unlit + 1.0 / 12.0).sqrt();
+    Some(CoarseCodes { up_to_adu: low, scatter_adu: [0.0, 0.5].map(scatter), told_adu })
 }
 
 /// The level above black below which the green of a frame demosaicked by smooth hue transition is less than

@@ -7,12 +7,14 @@
 //!
 //! and so for columns. Where codes follow straight each has its own slope, g_ak g_bl \[σ² + E_k E_l s²].
 
-use super::line_sums::curved;
+use super::bent_lines::BentLine;
+use super::law::Law;
+use super::line_sums::{bent, curved};
 use super::lines::{Axis, TAPPED_DRIFT};
 use super::moments::Prediction;
 use super::photosite::Photosite;
 use super::unpredictable::{Predicted, Unpredictable};
-use crate::metadata::AverageRecord;
+use crate::metadata::{AdcRecord, AverageRecord};
 use nalgebra::{DMatrix, Matrix3};
 
 /// Photosites of an amplifier, and the signal electrons that R, G and B of them expect.
@@ -27,6 +29,8 @@ pub struct TapLines {
     pub column: DMatrix<f64>,
     /// Of three planes: what samples of one place share beyond what they do by row and by column, by group.
     pub together: Vec<Matrix3<f64>>,
+    /// How photosites of a row, and of a column, go together beyond these; none where they follow what they share straight.
+    pub bent: [Option<BentLine>; 2],
 }
 
 impl TapLines {
@@ -57,7 +61,8 @@ impl TapLines {
         }
         let [row, column] = whole;
         let together = |sites: &[Prediction; 3]| Matrix3::from_fn(|k, l| sites[k].lines.together[l]);
-        Ok(Some(Self { row, column, together: moments.iter().map(together).collect() }))
+        let bent = if average.is_none() { bent_lines(sites)? } else { [None, None] };
+        Ok(Some(Self { row, column, together: moments.iter().map(together).collect(), bent }))
     }
 
     /// What of that is the same in every exposure.
@@ -67,7 +72,7 @@ impl TapLines {
     /// As [`Self::of`].
     pub(super) fn fixed(sites: &[Lit]) -> Predicted<Self> {
         let [row, column] = fixed(sites)?;
-        Ok(Self { row, column, together: vec![Matrix3::zeros(); sites.len()] })
+        Ok(Self { row, column, together: vec![Matrix3::zeros(); sites.len()], bent: [None, None] })
     }
 
     /// The matrices of rows and of columns.
@@ -79,6 +84,51 @@ impl TapLines {
     pub fn own(&self, at: usize, variance: f64) -> f64 {
         (variance - self.row[(at, at)] - self.column[(at, at)]).max(0.0)
     }
+
+    /// What of the third and fourth cumulants of photosites of such moments that stand at such a place is their own: no fourth is less than
+    /// −2κ₂².
+    pub fn own_cumulants(&self, at: usize, site: &Prediction) -> [f64; 2] {
+        let own = self.own(at, site.moments.variance);
+        let of_lines = self.bent.iter().flatten().map(|line| line.cumulants(at));
+        let [third, fourth] = of_lines.fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+        [site.third - third, (site.fourth() - fourth).max(-2.0 * own * own)]
+    }
+
+    /// Whether photosites follow what a line has on a curve.
+    pub fn are_bent(&self) -> bool {
+        self.bent.iter().any(Option::is_some)
+    }
+}
+
+impl Photosite {
+    /// Whether one photosite in 10¹³ or more of these signals follows what its line has on a curve, so that some lines scatter by less than
+    /// others; samples over a flat field are not told.
+    pub(super) fn bends_lines(&self, expected_e: [f64; 3]) -> Predicted<bool> {
+        if !self.has_lines() || self.flat.is_some() {
+            return Ok(false);
+        }
+        let ends = |adc: AdcRecord| expected_e.iter().any(|light_e| !Law::of(&self.model, *light_e).is_within(&adc));
+        let is_corrected = self.darks[0].is_some();
+        Ok(self.is_curved_in_lines(expected_e)? || is_corrected && self.adc.is_some_and(ends))
+    }
+}
+
+/// How photosites of lines go together beyond their covariances, where some of them follow what these have on a curve.
+fn bent_lines(sites: &[Lit]) -> Predicted<[Option<BentLine>; 2]> {
+    let bends = sites.iter().map(|(photosite, expected_e)| photosite.bends_lines(*expected_e));
+    if !bends.collect::<Predicted<Vec<bool>>>()?.contains(&true) {
+        return Ok([None, None]);
+    }
+    // What comes off adds to what is shared alone.
+    let codes: Vec<Lit> =
+        sites.iter().map(|(photosite, expected_e)| (photosite.less_dark_frames(0), *expected_e)).collect();
+    let found = Axis::ALL.map(|axis| bent(&codes, axis));
+    if sites.iter().any(|(photosite, _)| photosite.darks[0].is_some()) {
+        // Of these less is known, and lines are taken to be straight.
+        return Ok(found.map(|line| line.ok().flatten()));
+    }
+    let [row, column] = found;
+    Ok([row?, column?])
 }
 
 fn fixed(sites: &[Lit]) -> Predicted<[DMatrix<f64>; 2]> {

@@ -5,14 +5,14 @@
 //! photosites; over the rectangle there is so much of each kind, and what is between the means of kinds is variance like what is
 //! within them.
 
+use super::bent_lines::BentLine;
 use super::curved::{self, PixelLaw};
 use super::gains;
-use super::moments::Prediction;
 use super::sampling::Sampling;
 use super::spaces::{Channels, Curved};
 use super::tap_lines::TapLines;
 use super::tapped_axis::Axis;
-pub use super::tapped_factors::OverExposures;
+pub use super::tapped_factors::TapMoments;
 use super::tapped_factors::{Factors, Loads, Site, first_order, loads, product};
 use super::taps::Group;
 use super::unpredictable::{Predicted, Unpredictable};
@@ -57,12 +57,9 @@ pub(super) struct Array {
     pub weights: Weights,
     taps: Taps,
     size: [u32; 2],
-    /// By amplifier.
-    sites: Vec<[Prediction; 3]>,
-    /// What of their variance is their own.
-    own: Vec<[f64; 3]>,
-    /// What they share by rows and by columns; none where they share nothing.
-    pub factors: Option<[Factors; 2]>,
+    pub moments: TapMoments,
+    /// What rows, and columns, have beyond what is shared.
+    pub bent: [Option<BentLine>; 2],
     /// Columns and rows.
     pub axes: [Axis; 2],
 }
@@ -96,7 +93,10 @@ impl Array {
         let method = Method::named(&record.method)
             .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;
         let readout = frame.readout().map_err(|_| Unpredictable::Missing("sensor.readout"))?;
-        let taps = readout.taps.clone().ok_or(Unpredictable::Missing("sensor.readout.taps"))?;
+        // One amplifier reads all where no others are named.
+        let one =
+            || Taps { layout: TapLayout::Columns, gain: vec![1.0], offset_e: Vec::new(), read_noise_e: Vec::new() };
+        let taps = readout.taps.clone().unwrap_or_else(one);
         let plane = record.plane.ok_or(Unpredictable::Missing("demosaic.plane"))?;
         let geometry = &frame.geometry;
         let extents = [geometry.width, geometry.height];
@@ -108,27 +108,14 @@ impl Array {
             (lines.end <= length && !lines.is_empty()).then(|| Axis::of(first, length, lines, method.reach(), taps))
         };
         let axes = axis(0).zip(axis(1)).ok_or(Unpredictable::Beyond(ELSEWHERE))?;
-        let none = [Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0); 3];
-        let mut sites = vec![none; taps.count()];
-        let mut own = vec![[0.0; 3]; taps.count()];
-        for (index, (tap, group)) in groups.iter().enumerate() {
-            let of_class = |class: usize| {
-                let variance = group.sites[class].moments.variance;
-                lines.map_or(variance, |lines| lines.own(3 * index + class, variance))
-            };
-            if let (Some(sites), Some(own)) = (sites.get_mut(*tap), own.get_mut(*tap)) {
-                (*sites, *own) = (group.sites, [0, 1, 2].map(of_class));
-            }
-        }
-        let taps_of_groups: Vec<usize> = groups.iter().map(|(tap, _)| *tap).collect();
+        let moments: Vec<_> = groups.iter().map(|(tap, group)| (*tap, group.sites)).collect();
         Ok(Self {
             // No weight of the methods that are predicted hangs on hues.
             weights: WeightTable::of(method, record.cfa).about([1.0; 2]),
             taps,
             size: [readout.width, readout.height],
-            sites,
-            own,
-            factors: lines.map(|lines| lines.axes().map(|line| Factors::of(line, &taps_of_groups))),
+            moments: TapMoments::of(&moments, lines),
+            bent: lines.map_or([None, None], |lines| lines.bent.clone()),
             axes: axes.into(),
         })
     }
@@ -142,10 +129,16 @@ impl Array {
         self.taps.tap(self.size, self.on_sensor(at))
     }
 
-    /// The moments of the photosite of a column and row of the plane.
-    pub fn site(&self, at: [usize; 2]) -> &Prediction {
+    /// What reads the photosite of a column and row of the plane, and its class.
+    pub fn of_site(&self, at: [usize; 2]) -> [usize; 2] {
         let [x, y] = self.on_sensor(at);
-        &self.sites[self.tap(at)][self.weights.pattern().class(x, y) as usize]
+        [self.tap(at), self.weights.pattern().class(x, y) as usize]
+    }
+
+    /// Where it stands in what lines share.
+    pub fn place(&self, at: [usize; 2]) -> usize {
+        let [tap, class] = self.of_site(at);
+        self.moments.place(tap, class)
     }
 
     /// Photosites of the rectangle, one of each kind of place, and how many there are.
@@ -184,10 +177,16 @@ impl Array {
         if all > 0.0 { sum / all } else { 0.0 }
     }
 
-    /// What of the variance of that photosite is its own.
+    /// What of its variance is its own.
     pub fn own(&self, at: [usize; 2]) -> f64 {
-        let [x, y] = self.on_sensor(at);
-        self.own[self.tap(at)][self.weights.pattern().class(x, y) as usize]
+        let [tap, class] = self.of_site(at);
+        self.moments.own[tap][class]
+    }
+
+    /// The same of its third and fourth cumulants.
+    pub fn own_cumulants(&self, at: [usize; 2]) -> [f64; 2] {
+        let [tap, class] = self.of_site(at);
+        self.moments.cumulants[tap][class]
     }
 
     /// The pixel of a column and row, of demosaicked channels.
@@ -205,9 +204,9 @@ impl Array {
             let class = self.weights.class(phase, offset) as usize;
             // What lies beyond an edge is folded back.
             let tap = self.tap([0, 1].map(|axis| at[axis].saturating_add_signed(offset[axis])));
-            let of_site = self.sites[tap][class].moments.mean;
+            let of_site = self.moments.sites[tap][class].moments.mean;
             mean.iter_mut().zip(weights).for_each(|(mean, weight)| *mean += weight * (of_site - black));
-            sites.push(Site { offset, class, tap, variance: self.own[tap][class], weights });
+            sites.push(Site { offset, class, tap, variance: self.moments.own[tap][class], weights });
         }
         (mean, sites)
     }
@@ -220,7 +219,7 @@ impl Kind {
         sites.iter_mut().for_each(|site| site.weights = through(&channels.matrix, site.weights));
         let mut mean = through(&channels.matrix, mean.map(|mean| mean - channels.black));
         let own = |site: &Site| site.variance;
-        let factors = array.factors.as_ref();
+        let factors = array.moments.factors.as_ref();
         let mut covariance = first_order(&sites, own, factors);
         let (mut bias, mut beyond, mut from_camera) = ([0.0; 3], Matrix3::zeros(), channels.matrix);
         let mut curved_in = None;
@@ -230,7 +229,7 @@ impl Kind {
             }
             let local = space.about(mean)?;
             curved_in = Some((mean, local.jacobian));
-            let law = PixelLaw::of(sites.iter().map(|site| (site.weights, &array.sites[site.tap][site.class])));
+            let law = PixelLaw::of(sites.iter().map(|site| (site.weights, &array.moments.sites[site.tap][site.class])));
             // What rows and columns share is in the covariance alone: it is normal.
             let law = PixelLaw { covariance, ..law };
             let found = curved::moments(mean, &[law], |xyz| space.value(xyz));
@@ -250,7 +249,7 @@ impl Kind {
 
     /// What is the same in every exposure of what is curved beyond the weights, `fixed` the law of the means that photosites have over
     /// exposures, and `whole` what they share in one.
-    fn curved_pattern(&self, fixed: &OverExposures, whole: Option<&[Factors; 2]>, space: Curved) -> Matrix3<f64> {
+    fn curved_pattern(&self, fixed: &TapMoments, whole: Option<&[Factors; 2]>, space: Curved) -> Matrix3<f64> {
         let found = self.curved_in.and_then(|(mean, jacobian)| Some((mean, jacobian, jacobian.try_inverse()?)));
         let Some((mean, jacobian, back)) = found else { return Matrix3::zeros() };
         let before = |site: &Site| Site { weights: (back * Vector3::from(site.weights)).into(), ..*site };
@@ -364,27 +363,27 @@ impl TappedPixels {
     }
 
     /// What is the same in every exposure of what is curved beyond the weights, within kinds of places.
-    pub fn curved_pattern(&self, fixed: &OverExposures) -> Matrix3<f64> {
+    pub fn curved_pattern(&self, fixed: &TapMoments) -> Matrix3<f64> {
         let Some(space) = self.space else { return Matrix3::zeros() };
-        let whole = self.array.factors.as_ref();
+        let whole = self.array.moments.factors.as_ref();
         self.kinds.iter().map(|kind| kind.share * kind.curved_pattern(fixed, whole, space)).sum()
     }
 
     /// What is the same in every exposure to first order, within kinds of places.
-    pub fn fixed(&self, fixed: &OverExposures) -> Matrix3<f64> {
+    pub fn fixed(&self, fixed: &TapMoments) -> Matrix3<f64> {
         self.kinds.iter().map(|kind| kind.share * fixed.first_order(&kind.sites)).sum()
     }
 
     /// The covariance over all pixels to first order, within kinds of places.
     pub fn first_order(&self) -> Matrix3<f64> {
-        let factors = self.array.factors.as_ref();
+        let factors = self.array.moments.factors.as_ref();
         let of_kind = |kind: &Kind| kind.share * first_order(&kind.sites, |site| site.variance, factors);
         self.kinds.iter().map(of_kind).sum()
     }
 
     /// Whether photosites of a row or of a column share noise.
     pub fn has_lines(&self) -> bool {
-        self.array.factors.is_some()
+        self.array.moments.factors.is_some()
     }
 
     /// Distance of a pixel from what the mean is without noise.
@@ -411,7 +410,7 @@ impl TappedPixels {
         }
         let variances =
             std::array::from_fn(|place| if counts[place] > 0.0 { sums[place] / counts[place] } else { 0.0 });
-        let shared = self.array.factors.as_ref().map(|factors| {
+        let shared = self.array.moments.factors.as_ref().map(|factors| {
             [0, 1].map(|axis| Matrix3::from_fn(|k, l| self.array.mean_of_line(&factors[axis], axis, [k, l])))
         });
         let of = |phase| {
@@ -435,7 +434,7 @@ impl TappedPixels {
             let own = |site: &Site| variance(site.tap, site.class);
             return self.kinds.iter().map(|kind| kind.share * first_order(&kind.sites, own, None)).sum();
         };
-        let single = Factors::single(self.array.own.len(), |tap, class| variance(tap, class).max(0.0).sqrt());
+        let single = Factors::single(self.array.moments.own.len(), |tap, class| variance(tap, class).max(0.0).sqrt());
         let factors = if axis == 0 { [single, Factors::none()] } else { [Factors::none(), single] };
         let of_kind = |kind: &Kind| kind.share * first_order(&kind.sites, |_| 0.0, Some(&factors));
         self.kinds.iter().map(of_kind).sum()

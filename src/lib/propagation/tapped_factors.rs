@@ -139,31 +139,55 @@ pub(super) fn first_order(sites: &[Site], own: impl Fn(&Site) -> f64, factors: O
     shared.map_or(own, |shared| own + shared)
 }
 
-/// The means that photosites have over exposures.
+/// Moments of photosites behind each of some amplifiers, of one exposure or of their means over exposures.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OverExposures {
-    /// By amplifier.
+pub struct TapMoments {
+    /// By amplifier; none of those that read no photosite.
     pub(super) sites: Vec<[Prediction; 3]>,
-    own: Vec<[f64; 3]>,
-    factors: Option<[Factors; 2]>,
+    /// What of their variances is their own.
+    pub(super) own: Vec<[f64; 3]>,
+    /// What of their third and fourth cumulants is.
+    pub(super) cumulants: Vec<[[f64; 2]; 3]>,
+    /// What they share by rows and by columns; none where they share nothing.
+    pub(super) factors: Option<[Factors; 2]>,
+    /// Which of the groups are of an amplifier.
+    groups: Vec<usize>,
 }
 
-impl OverExposures {
-    /// Of photosites of amplifiers, whose means have such moments and share such rows and columns.
+impl TapMoments {
+    /// Of groups, each with its amplifier and moments, and of what these share.
     pub fn of(groups: &[(usize, [Prediction; 3])], lines: Option<&TapLines>) -> Self {
         let count = groups.iter().map(|(tap, _)| tap + 1).max().unwrap_or_default();
         let none = [Prediction::of_cumulants(0.0, 0.0, 0.0, 0.0); 3];
-        let (mut sites, mut own) = (vec![none; count], vec![[0.0; 3]; count]);
-        for (index, (tap, means)) in groups.iter().enumerate() {
-            sites[*tap] = *means;
-            own[*tap] = [0, 1, 2].map(|class| {
-                let variance = means[class].moments.variance;
-                lines.map_or(variance, |lines| lines.own(3 * index + class, variance))
-            });
-        }
         let taps: Vec<usize> = groups.iter().map(|(tap, _)| *tap).collect();
-        let factors = lines.map(|lines| lines.axes().map(|line| Factors::of(line, &taps)));
-        Self { sites, own, factors }
+        let mut found = Self {
+            sites: vec![none; count],
+            own: vec![[0.0; 3]; count],
+            cumulants: vec![[[0.0; 2]; 3]; count],
+            factors: lines.map(|lines| lines.axes().map(|line| Factors::of(line, &taps))),
+            groups: vec![0; count],
+        };
+        for (index, (tap, sites)) in groups.iter().enumerate() {
+            let of_class = |class: usize| {
+                let (place, site) = (3 * index + class, &sites[class]);
+                let variance = site.moments.variance;
+                match lines {
+                    Some(lines) => (lines.own(place, variance), lines.own_cumulants(place, site)),
+                    None => (variance, [site.third, site.fourth_of_own(variance)]),
+                }
+            };
+            let of_classes = [0, 1, 2].map(of_class);
+            found.sites[*tap] = *sites;
+            found.own[*tap] = of_classes.map(|(own, _)| own);
+            found.cumulants[*tap] = of_classes.map(|(_, cumulants)| cumulants);
+            found.groups[*tap] = index;
+        }
+        found
+    }
+
+    /// Where photosites of an amplifier and class stand in what lines share.
+    pub(super) fn place(&self, tap: usize, class: usize) -> usize {
+        3 * self.groups[tap] + class
     }
 
     /// To first order, the covariance of a pixel of such photosites.

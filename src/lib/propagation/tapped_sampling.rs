@@ -7,17 +7,18 @@
 //! - (n − 1)² cov(s_ij, s_kl) = tr(P C_ik P C_lj) + tr(P C_il P C_kj) + Σ_s \[κ₂ g_ij g_kl + κ₃ (Q_ij g_kl + g_ij Q_kl) + κ₄ Q_ij Q_kl]
 //!
 //! with Q_ij(s) = Σ_a W_i W_j − B_i B_j/n, B_i(s) = Σ_a W_i, and g_ij(s) = Σ_a d_i W_j + d_j W_i what the distances make of a photosite.
-//! Where photosites share rows and columns C has a part that reaches farther, whose sums are those of [`super::tapped_shares`].
+//! Where photosites share rows and columns C has a part that reaches farther, whose sums are those of [`super::tapped_shares`], and where they
+//! follow these on a curve lines add what [`super::tapped_bent`] has.
 //!
 //! All but P are sums over pixels, or photosites, of what lies around them, so that one of each kind of place is gone through.
 
+use super::bent_lines::BeyondNormal;
 use super::covariance::PAIRS;
 use super::line_sampling::Nonlocal;
 use super::place::add_products;
 use super::sampling::Sampling;
 use super::tapped::{Kind, TappedPixels};
 use super::tapped_shares::Shares;
-use crate::stages::demosaic::stencil::REACH;
 use nalgebra::{Matrix3, Vector3};
 
 /// Sums over pixels and photosites.
@@ -46,7 +47,7 @@ struct Sums {
 impl TappedPixels {
     /// How the sample means and covariances of the rectangle scatter; worked out once.
     pub fn sampling(&self) -> &Sampling {
-        self.sampling.get_or_init(|| Sums::of(self).sampling(self.count()))
+        self.sampling.get_or_init(|| Sums::of(self).sampling(self.count(), &self.beyond_normal()))
     }
 }
 
@@ -90,9 +91,8 @@ impl Sums {
             let of_distances = shares.of_distances();
             sums.of_distances.iter_mut().flatten().zip(of_distances.iter().flatten()).for_each(|(sum, of)| *sum += of);
         }
-        let count = pixels.count();
         for (at, times) in places(true) {
-            sums.add_site(pixels, at, times, count);
+            sums.add_site(pixels, at, times);
         }
         sums
     }
@@ -140,27 +140,10 @@ impl Sums {
         }
     }
 
-    /// So many photosites like that of a place, of a rectangle of so many pixels.
-    fn add_site(&mut self, pixels: &TappedPixels, at: [usize; 2], times: f64, count: f64) {
-        let (mut squares, mut sums, mut moved) = ([0.0; 6], [0.0; 3], [0.0; 6]);
-        for (pixel, [x, y]) in pixels.near(at, REACH) {
-            let w = pixel.weights([-x, -y]);
-            if w == [0.0; 3] {
-                continue;
-            }
-            let off = pixels.off(pixel);
-            for (pair, [i, j]) in PAIRS.into_iter().enumerate() {
-                squares[pair] += w[i] * w[j];
-                moved[pair] += off[i] * w[j] + off[j] * w[i];
-            }
-            sums.iter_mut().zip(w).for_each(|(sum, w)| *sum += w);
-        }
-        let site = pixels.array.site(at);
-        let (second, third) = (pixels.array.own(at), site.third);
-        let fourth = site.fourth_of_own(second);
-        for (pair, [i, j]) in PAIRS.into_iter().enumerate() {
-            squares[pair] -= sums[i] * sums[j] / count;
-        }
+    /// So many photosites like that of a place.
+    fn add_site(&mut self, pixels: &TappedPixels, at: [usize; 2], times: f64) {
+        let (squares, moved) = pixels.squares_of_site(at);
+        let (second, [third, fourth]) = (pixels.array.own(at), pixels.array.own_cumulants(at));
         for a in 0..PAIRS.len() {
             for b in 0..PAIRS.len() {
                 self.fourths[a][b] += times * fourth * squares[a] * squares[b];
@@ -170,7 +153,7 @@ impl Sums {
         }
     }
 
-    fn sampling(&self, count: f64) -> Sampling {
+    fn sampling(&self, count: f64, beyond: &BeyondNormal) -> Sampling {
         let free = (count - 1.0).max(f64::MIN_POSITIVE);
         let all = self.shared.as_ref().map_or(self.total, |shared| self.total + shared.total);
         let total = |i: usize, j: usize| all[(i, j)];
@@ -187,7 +170,7 @@ impl Sums {
         };
         let spread = std::array::from_fn(|a| {
             std::array::from_fn(|b| {
-                let found = of_normal(a, b) + self.fourths[a][b] + self.of_distances[a][b];
+                let found = of_normal(a, b) + self.fourths[a][b] + self.of_distances[a][b] + beyond.spread[a][b];
                 (if a == b { found.max(0.0) } else { found }) / (free * free)
             })
         });
@@ -208,7 +191,7 @@ impl Sums {
                 }
                 None => 0.0,
             };
-            (of_noise + 24.0 * (square - sum * sum / count).max(0.0)) / free.powi(3)
+            (of_noise + 24.0 * (square - sum * sum / count).max(0.0) + beyond.thirds[i]) / free.powi(3)
         };
         Sampling {
             count,
@@ -310,7 +293,7 @@ mod tests {
                 (0..3).map(|factor| a[factor] * b[factor]).sum()
             })
         };
-        TapLines { row: of(0), column: of(1), together: vec![Matrix3::zeros(); count] }
+        TapLines { row: of(0), column: of(1), together: vec![Matrix3::zeros(); count], bent: [None, None] }
     }
 
     /// Taps that are alike are one: sums in another order, relative 10⁻¹².
@@ -420,7 +403,10 @@ mod tests {
         let (n, sites) = (places.len(), columns * rows);
         let count = n as f64;
         let cumulant = |of: fn(&Prediction) -> f64| {
-            DVector::from_fn(sites, |s, _| of(pixels.array.site([s % columns, s / columns])))
+            DVector::from_fn(sites, |s, _| {
+                let [tap, class] = pixels.array.of_site([s % columns, s / columns]);
+                of(&pixels.array.moments.sites[tap][class])
+            })
         };
         let second = site_covariance(pixels, lines, [columns, rows]);
         let own = second.diagonal();

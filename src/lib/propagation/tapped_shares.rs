@@ -185,7 +185,7 @@ fn add_products(products: &mut [[f64; 6]; 6], gram: &DMatrix<f64>, values: &[f64
 impl<'a> Shares<'a> {
     /// Of pixels whose photosites share rows or columns; none of others.
     pub fn of(pixels: &'a TappedPixels) -> Option<Self> {
-        let factors = pixels.array.factors.as_ref()?;
+        let factors = pixels.array.moments.factors.as_ref()?;
         let reach = pixels.array.weights.reach().unsigned_abs();
         let lines = [0, 1].map(|axis| {
             let across = &pixels.array.axes[1 - axis];

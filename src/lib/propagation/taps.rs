@@ -241,8 +241,12 @@ fn kinds(first: i64, length: usize, kind: impl Fn(i64) -> [usize; 3]) -> Vec<(i6
 
 /// The amplifiers that have read a frame, and which photosites each; none where the sensor has one.
 fn cells(frame: &FrameHeader) -> Option<(Vec<usize>, Cells)> {
-    let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
-    let readout = readout.filter(|readout| readout.taps.is_some())?;
+    frame.taps().and_then(|_| all_cells(frame))
+}
+
+/// The same where the sensor has one, too.
+fn all_cells(frame: &FrameHeader) -> Option<(Vec<usize>, Cells)> {
+    let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref())?;
     let Geometry { width, height, origin, .. } = frame.geometry;
     let [x0, y0] = origin.map(i64::from);
     let lines = |axis: usize, first: i64, length: usize| {
@@ -359,6 +363,19 @@ pub(super) fn sites(
     let is_shared = moments.iter().flatten().any(|site| site.lines != LineCovariance::default());
     let lines = if is_shared { TapLines::of(&lit, &moments, average.as_ref())? } else { None };
     Ok(Some(TappedSites { groups, lines: lines.map(Box::new), cells }))
+}
+
+/// Photosites of a frame that one amplifier reads, of such moments, as one group; none where they do not follow what they share on a curve.
+///
+/// # Errors
+///
+/// [`Unpredictable::Beyond`] where no formula tells what they share.
+pub(super) fn one_group(frame: &FrameHeader, lit: &Lit, sites: [Prediction; 3]) -> Predicted<Option<TappedSites>> {
+    let lines = TapLines::of(std::slice::from_ref(lit), &[sites], None)?.filter(TapLines::are_bent);
+    let (Some(lines), Some((_, cells))) = (lines, all_cells(frame)) else { return Ok(None) };
+    let count = |class: Class| cells.all.iter().filter(|cell| cell.has(class)).map(|cell| cells.count(cell)).sum();
+    let groups = vec![Group { counts: Class::ALL.map(count), sites }];
+    Ok(Some(TappedSites { groups, lines: Some(Box::new(lines)), cells }))
 }
 
 /// Mean, variance and third cumulant of photosites of groups taken together, by classes; their excess kurtosis is what they have on

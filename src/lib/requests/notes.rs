@@ -3,6 +3,7 @@
 use crate::analysis::statistics::{ChannelReport, RegionReport, RepeatedReport, Report};
 use crate::formats::input::FrameReader;
 use crate::metadata::{AdcRecord, FrameHeader, HistoryEntry, Metadata};
+use crate::propagation::pixels::{CoarseCodes, coarse_codes};
 use crate::stream::RowSource;
 use crate::text::{counted, in_decimals, in_digits};
 use crate::units::QuantityKind;
@@ -148,12 +149,34 @@ pub fn of_expected(input: &FrameHeader) -> Option<Note> {
     is_expected.then(|| Note::Warning(text.into()))
 }
 
+/// Whether a program before made standard deviations of its pixels.
+fn has_sigma(frame: &FrameHeader) -> bool {
+    let is_given = |entry: &HistoryEntry| entry.arguments.iter().any(|argument| argument == "--sigma");
+    frame.metadata.history.iter().any(is_given)
+}
+
 /// A warning of standard deviations beside pixels that have no noise; not where a program before gave it.
 pub fn of_undrawn(input: &FrameHeader) -> Option<Note> {
-    let has_sigma = |entry: &HistoryEntry| entry.arguments.iter().any(|argument| argument == "--sigma");
-    let is_told = input.metadata.history.iter().any(has_sigma);
     let text = "no noise was drawn; the standard deviations are those of noisy frames of the same scene";
-    (input.is_undrawn() && !is_told).then(|| Note::Warning(text.into()))
+    (input.is_undrawn() && !has_sigma(input)).then(|| Note::Warning(text.into()))
+}
+
+/// A warning of standard deviations of codes that noise does not blur; not where a program before gave it.
+pub fn of_coarse_codes(frame: &FrameHeader) -> Option<Note> {
+    if has_sigma(frame) {
+        return None;
+    }
+    let CoarseCodes { up_to_adu, scatter_adu: [least, most], told_adu } = coarse_codes(frame)?;
+    Some(Note::Warning(format!(
+        "{}: up to {} ADU above black its noise is below half a code, so that a sample scatters by {} to {} ADU in the dark, by where in a code its level \
+         lies; the standard deviations count {}, with 1/12 ADU\u{b2} for rounding, which neighbors of one level have in common; more gain before the \
+         converter blurs it",
+        frame.name,
+        in_decimals(up_to_adu, 1),
+        in_decimals(least, 2),
+        in_decimals(most, 2),
+        in_decimals(told_adu, 2)
+    )))
 }
 
 /// A warning of codes that are not proportional to charge, of which colors are made all the same.

@@ -13,10 +13,12 @@
 //! - E s_ij = \[tr P C_ij + d_i·d_j]/(n − 1)
 //! - (n − 1)² cov(s_ij, s_kl) = tr(P C_ik P C_lj) + tr(P C_il P C_kj) + d_i C_jl d_k + d_i C_jk d_l + d_j C_il d_k + d_j C_ik d_l
 //!
-//! and what the third and fourth cumulants of photosites add, are sums over small matrices.
+//! and what the third and fourth cumulants of photosites add, and of whole lines where their photosites follow these on a curve, are sums over
+//! small matrices.
 
 use crate::cfa::Class;
 use crate::propagation::Prediction;
+use crate::propagation::bent_lines::{BeyondNormal, LineForm};
 use crate::propagation::covariance::PAIRS;
 use crate::propagation::sampling::Sampling;
 use crate::propagation::tap_lines::TapLines;
@@ -146,15 +148,53 @@ fn of_cumulants(samples: &Samples<'_>, off: &[DVector<f64>; 3], n: f64, [i, j]: 
             let [a, b, c] = channels.map(|channel| samples.place(cell, channel));
             a == b && b == c
         };
+        let own =
+            |channel: usize| samples.lines.own_cumulants(samples.place(cell, channel), samples.site(cell, channel));
         let third = |channels: [usize; 3], other: usize| {
-            if is_one(channels) { samples.site(cell, channels[0]).third * off[other][index] } else { 0.0 }
+            if is_one(channels) { own(channels[0])[0] * off[other][index] } else { 0.0 }
         };
         let thirds = third([i, j, l], k) + third([i, j, k], l) + third([j, k, l], i) + third([i, k, l], j);
         let is_fourth = is_one([i, j, k]) && is_one([j, k, l]);
-        let fourth = if is_fourth { samples.site(cell, i).fourth_of_own(samples.own(cell, i, i)) } else { 0.0 };
+        let fourth = if is_fourth { own(i)[1] } else { 0.0 };
         count * (kept * thirds + kept * kept * fourth)
     };
     samples.cells.iter().enumerate().map(of_cell).sum()
+}
+
+/// What lines add whose photosites follow what these share on a curve, `off` as of cumulants.
+fn beyond_normal(samples: &Samples<'_>, off: &[DVector<f64>; 3], n: f64) -> BeyondNormal {
+    let mut found = BeyondNormal::default();
+    let kinds = &samples.sites.cells;
+    for (axis, bent) in samples.lines.bent.iter().enumerate() {
+        let Some(bent) = bent else { continue };
+        let (lines, lengths) = if axis == 0 { (&kinds.rows, &kinds.columns) } else { (&kinds.columns, &kinds.rows) };
+        for (kind, count) in lines.iter().enumerate() {
+            let of_cell = |(index, cell): (usize, &&Cell)| {
+                let [line, along] = if axis == 0 { [cell.row, cell.column] } else { [cell.column, cell.row] };
+                let places = [0, 1, 2].map(|channel| samples.place(cell, channel));
+                (line == kind).then(|| (places, lengths[along], [0, 1, 2].map(|channel| off[channel][index])))
+            };
+            let cells: Vec<([usize; 3], f64, [f64; 3])> =
+                samples.cells.iter().enumerate().filter_map(of_cell).collect();
+            let form = |[i, j]: [usize; 2]| {
+                let mut form = LineForm::zero(bent.places());
+                for (places, length, off) in &cells {
+                    if places[i] == places[j] {
+                        form.add_square(places[i], length * (1.0 - 1.0 / n));
+                    }
+                    form.add_product([places[i], places[j]], *length);
+                    form.add_linear(places[i], length * off[j]);
+                    form.add_linear(places[j], length * off[i]);
+                    for (others, of_others, _) in &cells {
+                        form.add_product([places[i], others[j]], -length * of_others / n);
+                    }
+                }
+                form
+            };
+            bent.add(&PAIRS.map(form), *count, &mut found);
+        }
+    }
+    found
 }
 
 /// The law of the samples that are seen of photosites which share such rows and columns.
@@ -182,18 +222,19 @@ pub(super) fn sampling(sites: &TappedSites, lines: &TapLines, seen: Seen) -> Sam
     let of_distances = |i: usize| (projected.of(i, i) * &d[i]).norm_squared();
     let of_distances = [0, 1, 2].map(of_distances);
     blocks.push(projected);
+    let beyond = beyond_normal(&samples, &off, n);
     let spread = std::array::from_fn(|a| {
         std::array::from_fn(|b| {
             let ([i, j], [k, l]) = (PAIRS[a], PAIRS[b]);
             let normal = product(&blocks, [i, k], [l, j]) + product(&blocks, [i, l], [k, j]);
-            let found = normal + forms[a][b] + of_cumulants(&samples, &off, n, [i, j], [k, l]);
+            let found = normal + beyond.spread[a][b] + forms[a][b] + of_cumulants(&samples, &off, n, [i, j], [k, l]);
             (if a == b { found.max(0.0) } else { found }) / (free * free)
         })
     });
     let trace = |i: usize, j: usize| blocks.iter().map(|block| block.times * block.of(i, j).trace()).sum::<f64>();
     let third = |i: usize| {
         let of_noise: f64 = blocks.iter().map(|block| block.times * cube(block.of(i, i))).sum();
-        (8.0 * of_noise + 24.0 * of_distances[i]) / free.powi(3)
+        (8.0 * of_noise + 24.0 * of_distances[i] + beyond.thirds[i]) / free.powi(3)
     };
     Sampling {
         count: n,
@@ -227,7 +268,7 @@ mod tests {
             })
         };
         let matrix = Matrix3::from_fn(|k, l| if k == l { 0.0 } else { together });
-        TapLines { row: of(0), column: of(1), together: vec![matrix; groups] }
+        TapLines { row: of(0), column: of(1), together: vec![matrix; groups], bent: [None, None] }
     }
 
     /// Photosites of an amplifier, more of each group by a share.

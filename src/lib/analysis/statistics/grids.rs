@@ -132,6 +132,7 @@ impl Array {
         // tr(PCPC) = tr CC − (2/n) 1ᵀCC1 + (1ᵀC1)²/n².
         let trace = sum(&square) - 2.0 * sum(&|at| row_sum(at).powi(2)) / n + (total / n).powi(2);
         let of_offsets = sum(&|at| offset(at) * with_all(at, &offset));
+        let third = (1.0 - 1.0 / n) * sum(&|at| classes[class(at)].third * offset(at));
         let fourth = sum(&|at| classes[class(at)].fourth());
         let common: f64 = [0, 1, 2]
             .map(|k| {
@@ -145,7 +146,7 @@ impl Array {
             mean_variance: total / (n * n) + common,
             sample: MeanVariance {
                 mean: variance / (n - 1.0),
-                variance: (2.0 * trace + 4.0 * of_offsets + fourth).max(0.0) / (n - 1.0).powi(2),
+                variance: (2.0 * trace + 4.0 * (of_offsets + third) + fourth).max(0.0) / (n - 1.0).powi(2),
             },
         };
         if drifting.drifts() {
@@ -300,7 +301,7 @@ mod tests {
             let lines = LineCovariance { row: line(0), column: line(1), ..Default::default() };
             let variance = [1.0, 2.0, 0.5][k] + lines.row[k] + lines.column[k];
             let moments = MeanVariance { mean: [3.0, 7.0, 4.0][k], variance };
-            Prediction { moments, third: 0.0, excess_kurtosis: 0.3, sixth: 0.0, common: 0.0, lines }
+            Prediction { moments, third: 0.2 + 0.3 * k as f64, excess_kurtosis: 0.3, sixth: 0.0, common: 0.0, lines }
         })
     }
 
@@ -366,6 +367,8 @@ mod tests {
         let means = DVector::from_fn(n, |at, _| sites()[class(places[at])].moments.mean);
         let offsets = means.add_scalar(-means.mean());
         let fourth: f64 = places.iter().map(|at| sites()[class(*at)].fourth()).sum();
+        let third: f64 = places.iter().zip(&offsets).map(|(at, off)| sites()[class(*at)].third * off).sum();
+        let third = third * (1.0 - 1.0 / n as f64);
         let p = DMatrix::identity(n, n) - DMatrix::from_element(n, n, 1.0 / n as f64);
         let pc = &p * &c;
         let found = array.of_plane(&sites());
@@ -373,7 +376,7 @@ mod tests {
             mean_variance: c.sum() / (n * n) as f64,
             sample: MeanVariance {
                 mean: (pc.trace() + offsets.norm_squared()) / (n as f64 - 1.0),
-                variance: (2.0 * (&pc * &pc).trace() + 4.0 * offsets.dot(&(&c * &offsets)) + fourth)
+                variance: (2.0 * (&pc * &pc).trace() + 4.0 * (offsets.dot(&(&c * &offsets)) + third) + fourth)
                     / (n as f64 - 1.0).powi(2),
             },
         };

@@ -16,17 +16,24 @@ pub(super) struct Known {
     equations: Equations,
     pub prediction: Result<FramePrediction, Unpredictable>,
     pub samplings: Samplings,
-    /// Of regions of a frame that several amplifiers have read.
+    is_bent: bool,
+    /// Of regions of a frame that are told by their places.
     regions: Vec<(Region, Arc<Result<FramePrediction, Unpredictable>>)>,
 }
 
 impl Known {
-    /// What is predicted of a region of a frame that several amplifiers have read, with how it scatters.
+    /// Whether regions of a frame differ by their places, beyond what their size tells: several amplifiers have read it, or full well or an
+    /// end of the codes cuts off what rows and columns share.
+    pub fn are_by_place(&self, frame: &FrameHeader) -> bool {
+        frame.taps().is_some() || self.is_bent
+    }
+
+    /// What is predicted of a region of such a frame, with how it scatters.
     pub fn of_region(&mut self, frame: &FrameHeader, region: Region) -> Arc<Result<FramePrediction, Unpredictable>> {
         if let Some((_, known)) = self.regions.iter().find(|(of, _)| *of == region) {
             return Arc::clone(known);
         }
-        let found = Arc::new(propagation::of_frame(&region.header(frame), self.equations));
+        let found = Arc::new(of_samples(frame, region, self.equations));
         if let Ok(FramePrediction::Tapped(pixels)) = &*found {
             pixels.sampling();
         }
@@ -35,17 +42,26 @@ impl Known {
     }
 }
 
+/// What is predicted of the samples of a region of a frame; pixels that do not say where they were mirrored were so at its edges.
+fn of_samples(frame: &FrameHeader, region: Region, equations: Equations) -> Result<FramePrediction, Unpredictable> {
+    let mut header = region.header(frame);
+    if let Some(record) = header.metadata.demosaic.as_mut().filter(|_| frame.taps().is_none()) {
+        record.plane.get_or_insert(frame.geometry.on_sensor());
+    }
+    propagation::of_samples(&header, equations)
+}
+
 impl Laws {
     /// Those of a frame.
     pub(super) fn of(&mut self, frame: &FrameHeader, equations: Equations) -> &mut Known {
         let head = frame.without_exposure();
         let known = self.0.take().filter(|known| known.equations == equations && known.head == head);
-        self.0.insert(known.unwrap_or_else(|| Known {
-            prediction: propagation::of_frame(frame, equations),
-            samplings: Samplings::default(),
-            regions: Vec::new(),
-            head,
-            equations,
+        self.0.insert(known.unwrap_or_else(|| {
+            let prediction = propagation::of_frame(frame, equations);
+            let has_lines = prediction.as_ref().is_ok_and(FramePrediction::has_lines);
+            let is_by_place = |found| matches!(found, FramePrediction::Groups(_) | FramePrediction::Tapped(_));
+            let is_bent = has_lines && of_samples(frame, Region::whole(frame), equations).is_ok_and(is_by_place);
+            Known { prediction, samplings: Samplings::default(), is_bent, regions: Vec::new(), head, equations }
         }))
     }
 }

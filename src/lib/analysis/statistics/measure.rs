@@ -91,9 +91,9 @@ fn measure_all(
     let at_hand = at_hand(&mut watch, regions, (saturated, &levels), level.is_some() && !is_drawn)?;
     // Laws hang on the head of the frame alone: they are worked out while the programs before this one make its rows.
     let known = laws.of(&frame, equations);
-    // What several amplifiers have read differs from region to region.
+    let are_by_place = known.are_by_place(&frame);
     let of_regions: Option<Vec<_>> =
-        frame.taps().map(|_| regions.iter().map(|region| known.of_region(&frame, *region)).collect());
+        are_by_place.then(|| regions.iter().map(|region| known.of_region(&frame, *region)).collect());
     let Known { prediction, samplings, .. } = known;
     if let Ok(FramePrediction::Pixels(mixture)) = prediction {
         for region in regions {
@@ -101,7 +101,8 @@ fn measure_all(
         }
     }
     let mut portrait = is_drawn.then(|| {
-        let of_region = of_regions.as_ref().map_or(&*prediction, |of_regions| &*of_regions[0]);
+        let of_taps = of_regions.as_ref().filter(|_| frame.taps().is_some());
+        let of_region = of_taps.map_or(&*prediction, |of_regions| &*of_regions[0]);
         let is_alike =
             |drawn: &&FramePrediction| !matches!(drawn, FramePrediction::Groups(_) | FramePrediction::Tapped(_));
         let drawn = of_region.as_ref().ok().filter(is_alike);

@@ -1,0 +1,179 @@
+//! Sensors whose black level drifts along rows, behind one amplifier and several: what is drawn, what is predicted and what is refused.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+use crate::support::cmos::{
+    before_demosaicking, demosaicked, digitized, drifting, less_darks, noisy, plane_of, regions, regions_cover,
+    regions_or, scene, settings, several_taps, sigma_covers, tapped, tapped_with_lines, with_readout,
+};
+use crate::support::misses::trials;
+use crate::support::{assert_same, crop, through, through_cuts};
+use cyanometer::analysis::statistics::Region;
+use cyanometer::camera::linearity::Linearization;
+use cyanometer::camera::taps::{TapLayout, Taps};
+use cyanometer::numerics::significance::{of_chi_square, of_smallest};
+use cyanometer::numerics::vectors::Instructions;
+use cyanometer::propagation::pixels::PixelNoise;
+use cyanometer::propagation::{Equations, of_frame};
+use cyanometer::stages::adc::{AdcSettings, Digitize};
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stages::mosaic::Mosaic;
+use cyanometer::stages::noise::{AddNoise, NoiseSettings};
+use cyanometer::stream::MemoryFrame;
+use rayon::prelude::*;
+
+/// Mosaic, crops, bands, threads and instructions change no bit of what taps and drift make, before and behind the converter.
+#[test]
+fn taps_and_drift_belong_to_places() {
+    let settings = NoiseSettings { seed: 3, sensor_seed: 4, frame: 7, ..Default::default() };
+    for taps in several_taps() {
+        let mut light = tapped([530, 37], [900.0, 2000.0, 1500.0], &taps);
+        with_readout(&mut light, |readout| (readout.black_drift_e, readout.black_drift_rows) = (7.0, 5.5));
+        let stage = AddNoise::new(&light.header, &settings).unwrap();
+        let whole = through(&light, &stage);
+        let converter = Digitize::new(&whole.header, &AdcSettings::default()).unwrap();
+        let codes = through(&whole, &converter);
+        let plane = through(&light, &Mosaic::new(&light.header, None).unwrap());
+        assert_same(&digitized(&noisy(&plane, &settings)), &plane_of(&codes), "mosaic");
+        for [x, y, width, height] in
+            [[0, 0, 530, 37], [3, 5, 300, 20], [129, 17, 70, 20], [264, 30, 17, 7], [265, 18, 1, 1]]
+        {
+            let part = noisy(&crop(&light, x, y, width, height), &settings);
+            assert_same(&part, &crop(&whole, x, y, width, height), "crop");
+            assert_same(&digitized(&part), &crop(&codes, x, y, width, height), "crop of codes");
+        }
+        assert_same(&through_cuts(&light, &stage, &[1, 18, 20]).0, &whole, "bands");
+        assert_same(&through_cuts(&whole, &converter, &[1, 18, 20]).0, &codes, "bands of codes");
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert_same(&pool.install(|| through(&light, &stage)), &whole, "threads");
+        }
+        assert_same(&through(&light, &stage.clone().on(Instructions::up_to_256_bits())), &whole, "instructions");
+    }
+    // Taps that do not differ are none.
+    let light = scene([60, 37], [900.0, 2000.0, 1500.0]);
+    let mut alike = light.clone();
+    with_readout(&mut alike, |readout| {
+        let taps =
+            Taps { layout: TapLayout::Quadrants, gain: vec![1.0; 4], offset_e: vec![], read_noise_e: vec![6.0; 4] };
+        readout.taps = Some(taps);
+    });
+    assert_same(&digitized(&noisy(&alike, &settings)), &digitized(&noisy(&light, &settings)), "taps alike");
+}
+
+/// So do frames whose black level drifts over fewer rows than they have, as many, and more.
+#[test]
+fn drifting_frames_raise_false_alarms_at_the_stated_rate() {
+    for rows in [3.3, 20.0, 170.0] {
+        let scene = drifting([24, 19], [900.0, 2500.0, 1800.0], rows);
+        let sites = |seed: u64| before_demosaicking(&scene, seed);
+        let some = Region { x: 2, y: 3, width: 17, height: 12 };
+        regions_cover(&format!("drift over {rows} rows"), &[Region { x: 0, y: 0, width: 24, height: 19 }, some], sites);
+    }
+}
+
+/// Means and variances of regions over many sensors, as standard deviations of their scatter: means have the predicted variance, and
+/// sample variances the predicted mean.
+#[test]
+fn regions_of_taps_and_drift_scatter_as_predicted() {
+    let seeds = trials(1500);
+    let scenes = [
+        tapped([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[4]),
+        tapped([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[1]),
+        tapped_with_lines([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[4]),
+        tapped_with_lines([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[1]),
+        drifting([26, 22], [900.0, 2500.0, 1800.0], 9.0),
+        drifting([26, 22], [900.0, 2500.0, 1800.0], 60.0),
+    ];
+    let part = [Region { x: 5, y: 3, width: 16, height: 15 }];
+    let mut smallest = 1.0_f64;
+    let mut tests = 0;
+    for scene in &scenes {
+        let of = |seed: u64| {
+            let codes = digitized(&noisy(scene, &settings(seed + 70_000)));
+            let plane = plane_of(&codes);
+            let less = less_darks(&plane, scene, seed + 70_000, 2);
+            let reports = [&codes, &plane, &less].map(|frame| regions(frame, &part).remove(0));
+            let [codes, plane, less] = reports;
+            let mut found = codes.channels;
+            found.extend(plane.classes);
+            found.extend(plane.channels);
+            found.extend(less.classes);
+            found
+        };
+        let all: Vec<_> = (0..seeds).into_par_iter().map(of).collect();
+        for index in 0..all[0].len() {
+            let z: Vec<f64> = all.iter().map(|channels| channels[index].z_mean.unwrap()).collect();
+            let mean = z.iter().sum::<f64>() / seeds as f64;
+            let square: f64 = z.iter().map(|z| z * z).sum();
+            // Standard errors are known, means too: chi-square of so many, and a normal mean.
+            let p = of_chi_square(square, seeds as f64);
+            assert!(p > 1e-6, "mean {index}: {}", (square / seeds as f64).sqrt());
+            assert!(mean.abs() < 5.0 / (seeds as f64).sqrt(), "mean {index}: {mean}");
+            smallest = smallest.min(p);
+            tests += 1;
+        }
+    }
+    assert!(of_smallest(smallest, tests) > 1e-4, "{smallest} of {tests}");
+}
+
+/// What is not predicted is refused with the key in the reason.
+#[test]
+fn what_taps_and_drift_leave_open_is_refused() {
+    let why = |frame: &MemoryFrame| of_frame(&frame.header, Equations::Exact).unwrap_err().to_string();
+    let taps = &several_taps()[2];
+    let scene = tapped([26, 22], [900.0, 2500.0, 1800.0], taps);
+    let plane = plane_of(&digitized(&noisy(&scene, &settings(1))));
+    let camera = demosaicked(&plane, Method::SmoothHue);
+    assert!(why(&camera).contains("several amplifiers (`taps`"), "{}", why(&camera));
+    // The left half with the reach of the method is predicted, and one column more is not; by another method all is.
+    let left = |width: usize| Region { x: 0, y: 0, width, height: 22 };
+    let reach = Method::SmoothHue.reach();
+    assert!(regions_or(&camera, left(13 - reach)).is_ok());
+    assert!(regions_or(&camera, left(14 - reach)).is_err());
+    let mut camera = demosaicked(&plane, Method::Bilinear);
+    assert!(regions_or(&camera, left(14)).is_ok());
+    assert!(of_frame(&camera.header, Equations::Paper).unwrap_err().to_string().contains("one amplifier"));
+    camera.header.metadata.demosaic.as_mut().unwrap().plane = None;
+    assert_eq!(why(&camera), "the metadata has no `demosaic.plane`");
+    camera.header.metadata.demosaic.as_mut().unwrap().plane = Some([1, 0, 26, 22]);
+    assert!(why(&camera).contains("`demosaic.plane`"), "{}", why(&camera));
+    let mut drifting_taps = scene.clone();
+    with_readout(&mut drifting_taps, |readout| (readout.black_drift_e, readout.black_drift_rows) = (7.0, 9.0));
+    let codes = digitized(&noisy(&drifting_taps, &settings(1)));
+    for told in [why(&codes), why(&demosaicked(&plane_of(&codes), Method::Bilinear))] {
+        assert!(told.contains("`black_drift_e`") && told.contains("several amplifiers"), "{told}");
+    }
+    assert!(regions_or(&codes, left(13)).is_ok());
+    let turns = tapped([26, 22], [900.0, 2500.0, 1800.0], &several_taps()[0]);
+    let told = why(&demosaicked(&plane_of(&digitized(&noisy(&turns, &settings(1)))), Method::SmoothHue));
+    assert!(told.contains("several amplifiers (`taps`") && !told.contains("behind one"), "{told}");
+    let cte =
+        AddNoise::new(&scene.header, &NoiseSettings { cte: Some(0.9999), ..settings(1) }).unwrap_err().to_string();
+    assert!(cte.contains("several `taps`"), "{cte}");
+    let drift = drifting([26, 22], [900.0, 2500.0, 1800.0], 9.0);
+    let camera = demosaicked(&plane_of(&digitized(&noisy(&drift, &settings(1)))), Method::Bilinear);
+    assert!(why(&camera).contains("`black_drift_e`"), "{}", why(&camera));
+    assert!(PixelNoise::of(&camera.header).is_ok());
+    let full = drifting([26, 22], [29_990.0, 2500.0, 1800.0], 9.0);
+    assert!(why(&digitized(&noisy(&full, &settings(1)))).contains("black level drifts along rows, and full well"));
+    let mut bent = drift;
+    with_readout(&mut bent, |readout| {
+        readout.linearization = Some(Linearization::polynomial(vec![1.0, 1.2e-5]).unwrap());
+    });
+    let told = why(&digitized(&noisy(&bent, &settings(1))));
+    assert!(told.contains("black level drifts along rows, and the curve of the converter"), "{told}");
+}
+
+/// At each row, edges too, of a drift that is most of the noise, from knots nearer than stencils reach to those farther off than the
+/// frame. One that is left out, or taken to be the same in all rows, is half or twice the variance.
+#[test]
+fn sigma_knows_how_black_drifts() {
+    let methods = [Method::Bilinear, Method::EffectiveColor, Method::SmoothHue, Method::Malvar];
+    let places: Vec<[usize; 2]> = (0..13).flat_map(|y| [[4, y], [5, y]]).collect();
+    for rows in [2.0, 3.3, 40.0] {
+        let mut scene = drifting([10, 13], [900.0, 2500.0, 1800.0], rows);
+        with_readout(&mut scene, |readout| readout.black_drift_e = 80.0);
+        sigma_covers(&format!("{rows} rows"), &scene, &methods, &places);
+    }
+}
