@@ -57,18 +57,8 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
     };
     let argument = context(ContextKind::InvalidArg).unwrap_or_default();
     let value = context(ContextKind::InvalidValue).unwrap_or_default();
-    let in_words = |meant: Option<String>| meant.map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
     let problem = match error.kind() {
-        ErrorKind::UnknownArgument => {
-            let hint = in_words(meant(&argument, command, words).or_else(|| near_option(&argument, command)));
-            let hint = output_hint(&argument, command, words).map_or(hint, |output| format!("; {output}"));
-            let hint = too_many(&argument, command, words).map_or(hint, |taken| format!("; {taken}"));
-            let hint = in_quotes(&argument, command, words).map_or(hint, |quoted| format!("; write {quoted}"));
-            let hint = of_file(&argument, words).map_or(hint, |file| format!("; for the file write `./{file}`"));
-            let hint = if argument.strip_prefix("--") == Some("list") { LISTS_OF_DATA.to_owned() } else { hint };
-            let argument = one_dash(&argument, words).unwrap_or(&argument);
-            format!("unknown option or extra argument `{argument}`{hint}")
-        }
+        ErrorKind::UnknownArgument => unknown(&argument, command, words),
         ErrorKind::InvalidValue if value.is_empty() => format!("{argument} needs a value"),
         ErrorKind::InvalidValue => {
             let choices = context(ContextKind::ValidValue);
@@ -115,6 +105,44 @@ pub(super) fn one_line(program: &str, error: &clap::Error, command: &Command, wo
     };
     let joined = if problem.ends_with('?') { " See" } else { "; see" };
     format!("{problem}{joined} `{program} --help`")
+}
+
+/// What may be meant, behind a complaint.
+fn in_words(meant: Option<String>) -> String {
+    meant.map_or(String::new(), |meant| format!("; did you mean `{meant}`?"))
+}
+
+/// The complaint of an argument that is none here.
+fn unknown(argument: &str, command: &Command, words: &[String]) -> String {
+    let hint = in_words(meant(argument, command, words).or_else(|| near_option(argument, command)));
+    let of_another = || elsewhere(argument, command).unwrap_or_default();
+    let hint = if hint.is_empty() { of_another() } else { hint };
+    let hint = output_hint(argument, command, words).map_or(hint, |output| format!("; {output}"));
+    let hint = too_many(argument, command, words).map_or(hint, |taken| format!("; {taken}"));
+    let hint = in_quotes(argument, command, words).map_or(hint, |quoted| format!("; write {quoted}"));
+    let hint = of_file(argument, words).map_or(hint, |file| format!("; for the file write `./{file}`"));
+    let hint = negative_value(argument, words)
+        .map_or(hint, |value| format!("; a value that begins with - stands behind =: {value}"));
+    let argument = one_dash(argument, words).unwrap_or(argument);
+    format!("unknown option or extra argument `{argument}`{hint}")
+}
+
+/// Where an option is at home that this program lacks.
+fn elsewhere(argument: &str, command: &Command) -> Option<String> {
+    let typed = argument.strip_prefix("--")?;
+    if command.get_arguments().any(|option| option.get_long() == Some(typed)) {
+        return None;
+    }
+    let (_, place) = ELSEWHERE.into_iter().find(|(option, _)| *option == typed)?;
+    Some(format!("; {place}"))
+}
+
+/// An option with a value behind an equals sign that was taken for an option of its own: `--size -5x480`.
+fn negative_value(argument: &str, words: &[String]) -> Option<String> {
+    let typed = argument.strip_prefix('-').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.'))?;
+    let place = words.iter().position(|word| word.strip_prefix('-').is_some_and(|rest| rest.starts_with(typed)))?;
+    let option = words.get(place.checked_sub(1)?).filter(|word| word.starts_with("--") && !word.contains('='))?;
+    Some(format!("{option}={}", words[place]))
 }
 
 /// The option without which nothing would be missing.
@@ -198,8 +226,26 @@ fn respelled(value: &str, command: &Command, words: &[String]) -> Option<String>
     })
 }
 
-/// What is said of an option that lists what there is.
-const LISTS_OF_DATA: &str = "; `cyanometer list` tells the spectra, sensors and tables that come with the programs";
+/// What is said of options that other programs have.
+const ELSEWHERE: [(&str, &str); 17] = [
+    ("list", "`cyanometer list` tells the spectra, sensors and tables that come with the programs"),
+    ("template", "`cyanometer template sensor`, `… matrix` or `… metadata` prints a file to fill in"),
+    ("electrons", "it is an option of `render-radiance`"),
+    ("exposure", "it is an option of `render-radiance`"),
+    ("expose-to", "it is an option of `render-radiance`"),
+    ("seed", "it is an option of `add-noise`"),
+    ("sensor-seed", "it is an option of `add-noise`"),
+    ("bits", "it is an option of `digitize`"),
+    ("slope", "it is an option of `digitize`"),
+    ("bias", "it is an option of `digitize`"),
+    ("dark", "it is an option of `correct-frame`"),
+    ("flat", "it is an option of `correct-frame`"),
+    ("method", "it is an option of `demosaic`"),
+    ("matrix", "it is an option of `to-xyz`"),
+    ("space", "it is an option of `to-xyz`"),
+    ("check", "it is an option of `measure`"),
+    ("false-color", "it is an option of `preview`"),
+];
 
 /// Lists of numbers, of which an option that takes such takes one.
 const LISTS: [&str; 4] = ["1,2", "1,2,3", "1,2,3,4", "1,2,3,4,5,6,7,8"];
