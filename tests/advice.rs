@@ -227,7 +227,7 @@ const OUTPUTS: &[Advice] = &[
     advice("preview noisy.exr -o out.jpg", "end the name in .png", &["preview noisy.exr -o out.png"]),
     advice(
         "digitize noisy.exr -o out.jpg",
-        "end the name in .exr, .tiff, .dng or .png, or give --format",
+        "end the name in .exr, .tiff, .dng or .png (for a stack of frames in .zarr, by `stack-frames`), or give --format",
         &[
             "digitize noisy.exr -o out.exr",
             "digitize noisy.exr -o out.tiff",

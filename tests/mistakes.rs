@@ -294,7 +294,7 @@ const MISTAKES: [(&str, i32, &str); 138] = [
     (
         "correct-frame codes.exr --black auto --combine median",
         BAD_USAGE,
-        "--dark <FILE> or --bias <FILE> or --flat <FILE> is missing, without which an option that is given has no effect; see \
+        "--dark <FILE> or --bias <FILE> or --flat <FILE> is missing, without which --combine has no effect; see \
          `correct-frame --help`",
     ),
     (
@@ -305,7 +305,7 @@ const MISTAKES: [(&str, i32, &str); 138] = [
     (
         "measure codes.exr --level 0.01",
         BAD_USAGE,
-        "--check is missing, without which an option that is given has no effect; see `measure --help`",
+        "--check is missing, without which --level has no effect; see `measure --help`",
     ),
     (
         "demosaic plane.exr --pattern bggr",
@@ -325,17 +325,17 @@ const MISTAKES: [(&str, i32, &str); 138] = [
     (
         "to-xyz rgb.exr --matrix matrix.yaml --adaptation cat16",
         BAD_USAGE,
-        "--adapt-to <LIGHT> is missing, without which an option that is given has no effect; see `to-xyz --help`",
+        "--adapt-to <LIGHT> is missing, without which --adaptation has no effect; see `to-xyz --help`",
     ),
     (
         "fit-matrix SAMPLES/skies/sky912.exr --seed 3",
         BAD_USAGE,
-        "--evaluate <LIBRARY> is missing, without which an option that is given has no effect; see `fit-matrix --help`",
+        "--evaluate <LIBRARY> is missing, without which --seed has no effect; see `fit-matrix --help`",
     ),
     (
         "render-radiance --dark --focal-length 20",
         BAD_USAGE,
-        "--vignetting is missing, without which an option that is given has no effect; see `render-radiance --help`",
+        "--vignetting is missing, without which --focal-length has no effect; see `render-radiance --help`",
     ),
     ("digitize codes.exr", BAD_DATA, "codes.exr: it holds three planes of ADU: it is digitized already"),
     ("digitize noisy.exr --bits 20", BAD_USAGE, "a converter of 20 bits is impossible here; give 1 to 16"),
@@ -347,7 +347,7 @@ const MISTAKES: [(&str, i32, &str); 138] = [
     (
         "digitize noisy.exr -o codes.jpg",
         BAD_USAGE,
-        "codes.jpg: `.jpg` names no format that is written here; end the name in .exr, .tiff, .dng or .png, or give --format",
+        "codes.jpg: `.jpg` names no format that is written here; end the name in .exr, .tiff, .dng or .png (for a stack of frames in .zarr, by `stack-frames`), or give --format",
     ),
     (
         "digitize noisy.exr -o codes.png --sample-type f32",

@@ -155,6 +155,14 @@ impl SpectralResponse {
     ) -> Result<GridWeights> {
         let all = self.electron_weights(sensor, exposure, &all_nm, &widths)?;
         let kept: Vec<usize> = (0..all_nm.len()).filter(|&i| all.iter().any(|class| class[i] != 0.0)).collect();
+        if kept.is_empty() && grid.start_nm == grid.end_nm {
+            let nm = grid.start_nm;
+            return Err(Error::Data(format!(
+                "from {nm} to {nm} nm there is nothing to sum over; for light of one wavelength give it some width, as from {} to {} nm",
+                nm - 0.5,
+                nm + 0.5
+            )));
+        }
         if kept.is_empty() {
             return Err(Error::Data(format!(
                 "the sensor {} does not respond between {} and {} nm",

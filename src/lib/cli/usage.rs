@@ -513,10 +513,10 @@ mod tests {
             ),
             ("--output a --output b", "--output <output> is given twice"),
             ("--output a --dark --seed 1", "--dark and --seed <seed> exclude each other"),
-            ("--output a --clip", "--dark is missing, without which an option that is given has no effect"),
+            ("--output a --clip", "--dark is missing, without which --clip has no effect"),
             (
                 "--output a --kappa",
-                "--seed <seed> or --method <method> is missing, without which an option that is given has no effect",
+                "--seed <seed> or --method <method> is missing, without which --kappa has no effect",
             ),
             ("--output a --size 1", "2 values required for '--size <size> <size>' but 1 was provided"),
             ("--output a --level 1", "equal sign is needed when assigning values to '--level=<level>'"),

@@ -76,6 +76,8 @@ pub enum White {
     D50,
     /// Chromaticity of equal energy, (⅓, ⅓).
     EqualEnergy,
+    /// Another chromaticity, x and y.
+    Chromaticity([f64; 2]),
     /// Absolute XYZ.
     Absolute([f64; 3]),
 }
@@ -87,16 +89,25 @@ impl fmt::Display for White {
             Self::D65 => f.write_str("d65"),
             Self::D50 => f.write_str("d50"),
             Self::EqualEnergy => f.write_str("e"),
+            Self::Chromaticity([x, y]) => write!(f, "of x {x:.4}, y {y:.4}"),
             Self::Absolute([x, y, z]) => write!(f, "{x},{y},{z}"),
         }
     }
 }
 
 impl White {
+    /// The white of a chromaticity, by its name where it has one.
+    pub fn of_chromaticity(xy: [f64; 2]) -> Self {
+        let named = [(D65_XY, Self::D65), (D50_XY, Self::D50), ([1.0 / 3.0; 2], Self::EqualEnergy)];
+        let is_it = |known: [f64; 2]| (known[0] - xy[0]).abs().max((known[1] - xy[1]).abs()) < 1e-6;
+        named.into_iter().find(|(known, _)| is_it(*known)).map_or(Self::Chromaticity(xy), |(_, white)| white)
+    }
+
     /// Its XYZ where it has this luminance; those given outright stay.
     pub fn xyz(self, luminance: f64) -> [f64; 3] {
         match self {
             Self::Absolute(white) => white,
+            Self::Chromaticity(xy) => xyz_of_chromaticity(xy, luminance),
             Self::D65 => xyz_of_chromaticity(D65_XY, luminance),
             Self::D50 => xyz_of_chromaticity(D50_XY, luminance),
             Self::EqualEnergy => xyz_of_chromaticity([1.0 / 3.0; 2], luminance),

@@ -10,6 +10,7 @@ mod illumination;
 mod levels;
 mod ranges;
 mod records;
+mod samples;
 
 pub use black_noise::BlackNoise;
 pub use capture::{CaptureRecord, FirstRow};
@@ -23,9 +24,9 @@ pub use header::FrameHeader;
 pub use illumination::Illumination;
 pub use records::{
     AdaptationRecord, CameraSettings, ColorRecord, Coverage, DemosaicRecord, HistoryEntry, LeftOut, MatrixResidual,
-    NoiseRecord, PoissonKind, PredictedRecord, ProfileRecord, RelativeMatrix, SamplesRecord, Scene, Seal, TakenAs,
-    UpsamplingRecord,
+    NoiseRecord, PoissonKind, PredictedRecord, ProfileRecord, RelativeMatrix, Scene, TakenAs, UpsamplingRecord,
 };
+pub use samples::{SamplesRecord, Seal};
 
 use crate::camera::levels::{BlackLevel, WhiteLevel};
 use crate::camera::optics::{self, Exposure};

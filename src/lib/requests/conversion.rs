@@ -33,7 +33,7 @@ pub(super) const OF_SENSOR: &str = "sensor";
 /// Which colors are made of a frame, and by which matrix.
 #[derive(Debug, Clone, Args)]
 #[command(mut_arg("white", |option| option.help(
-    "White of lab, luv, srgb and linear-srgb, of XYZ that are there already recorded with any space: d65, d50, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative; by default that which XYZ record, or d65"
+    "White of lab, luv, srgb and linear-srgb, of XYZ that are there already recorded with any space: d65, d50, e, or its X,Y,Z on the scale of the XYZ: cd/m2, or relative; by default the light of --adapt-to, that which XYZ record, or d65"
 )))]
 #[command(mut_arg("white_luminance", |option| option.help(
     "Luminance of the white d65, d50 or e in cd/m2; by default that at which the camera saturates, or of XYZ what they record. Of relative XYZ it is 1"
@@ -132,7 +132,7 @@ impl Conversion {
             residual: matrix.residual(),
             method: matrix.method,
             space: self.space,
-            white: self.white.or_daylight(),
+            white: self.reference_white(adapting),
             white_luminance: self.white.white_luminance,
         };
         let mut stage = ToXyz::beside(frame, &settings, self.locus()?)?;
@@ -140,9 +140,9 @@ impl Conversion {
             record.scene_white_xy = adapting.map(|adapting| adapting.to_xy).or(matrix.white_xy);
             record.adapted = adapting.map(Adapting::record);
             record.scene_error = scene_error;
-            notes.extend(self.doubt_of_light(record.scene_white_xy));
+            notes.extend(self.doubt_of_light(record.scene_white_xy, settings.white));
         }
-        notes.extend(self.doubt_of_brightness(&stage));
+        notes.extend(self.doubt_of_brightness(&stage, settings.white));
         Ok((stage, notes))
     }
 
@@ -190,29 +190,33 @@ impl Conversion {
         FromXyz::new(reader.header(), &settings).map(Some)
     }
 
+    /// The white that is named, or what colors are adapted to, or D65.
+    fn reference_white(&self, adapting: Option<Adapting>) -> White {
+        let adapted = || adapting.map(|adapting| White::of_chromaticity(adapting.to_xy));
+        self.white.white.or_else(adapted).unwrap_or_default()
+    }
+
     /// What to say where the light of the colors is not the white that they are referred to.
-    fn doubt_of_light(&self, light_xy: Option<[f64; 2]>) -> Option<Note> {
+    fn doubt_of_light(&self, light_xy: Option<[f64; 2]>, white: White) -> Option<Note> {
         /// Chromaticities that are nearer are those of one light.
         const NEAR: f64 = 0.005;
         let [x, y] = light_xy.filter(|_| needs_white(self.space))?;
-        let white = color::chromaticity(self.white.or_daylight().xyz(1.0));
-        let is_far = (x - white[0]).abs().max((y - white[1]).abs()) > NEAR;
+        let [white_x, white_y] = color::chromaticity(white.xyz(1.0));
+        let is_far = (x - white_x).abs().max((y - white_y).abs()) > NEAR;
         is_far.then(|| {
             let text = format!(
-                "what is white in its light, x {x:.4}, y {y:.4}, is not that under the white {}; --adapt-to {} makes it so",
-                self.white.or_daylight(), self.white.or_daylight()
+                "what is white in its light, x {x:.4}, y {y:.4}, is not that under the white {white}; --adapt-to {white} makes it so"
             );
             Note::Remark(text)
         })
     }
 
     /// What to say where the matrix does not tell how bright the white is by which the camera saturates.
-    fn doubt_of_brightness(&self, stage: &ToXyz) -> Option<Note> {
+    fn doubt_of_brightness(&self, stage: &ToXyz, white: White) -> Option<Note> {
         let [_, luminance, _] = stage.white_stands_in().then(|| stage.white())?;
         let text = format!(
-            "by the matrix the white {} has no signal in one of the classes; its luminance is that of equal signals that saturate, \
-             {luminance:.4} cd/m2: --white-luminance says another",
-            self.white.or_daylight()
+            "by the matrix the white {white} has no signal in one of the classes; its luminance is that of equal signals that saturate, \
+             {luminance:.4} cd/m2: --white-luminance says another"
         );
         Some(if needs_white(self.space) { Note::Warning(text) } else { Note::Remark(text) })
     }

@@ -75,6 +75,9 @@ pub fn check_exposures(files: &[PathBuf]) -> Result<()> {
 ///
 /// Those of [`check_contents`].
 pub fn check_copies(frames: &Input) -> Result<()> {
+    if frames.inputs.len() < 2 {
+        return Ok(());
+    }
     let exposure = |file: &PathBuf| (Role::Exposure, frames.only(Some(file), None).options());
     check_contents(&frames.inputs.iter().map(exposure).collect::<Vec<_>>())
 }

@@ -73,7 +73,7 @@ impl Adapting {
 pub struct XyzSettings {
     /// The space.
     pub space: Space,
-    /// The white of L*a*b*, L*u*v* and sRGB; by default that which the frame records, or D65.
+    /// The white of L*a*b*, L*u*v* and sRGB; by default the light that colors are adapted to, that which the frame records, or D65.
     pub white: Option<White>,
     /// Luminance of a white that is not given as XYZ, cd m⁻²; by default that which the frame records.
     pub white_luminance: Option<f64>,
@@ -125,7 +125,8 @@ impl FromXyz {
             geometry.channels.extend(layers_of(space)?.into_iter().map(str::to_owned));
             metadata.uncertainty = input.metadata.uncertainty.clone().or_else(|| Some(Coverage::noise_only(None)));
         }
-        let is_recorded = needs_white(space) || settings.names_white();
+        let has_white = input.metadata.color.as_ref().is_some_and(|color| color.white.is_some());
+        let is_recorded = needs_white(space) || settings.names_white() || settings.adapting.is_some() && has_white;
         if is_recorded || settings.adapting.is_some() {
             let record = metadata.color.get_or_insert_with(ColorRecord::of_xyz);
             if is_recorded {
@@ -191,8 +192,12 @@ fn reference_white(input: &FrameHeader, settings: &XyzSettings) -> Result<[f64; 
     }
     let recorded = metadata.color.as_ref().and_then(|color| color.white);
     let of_frame = || if is_relative { Some(1.0) } else { recorded.map(|white| white[1]) };
-    let named = settings.white.unwrap_or_default();
-    match (settings.white, recorded, settings.white_luminance.or_else(of_frame)) {
+    // What is white in the scene has become the light that colors are adapted to.
+    let adapted = settings.adapting.map(|adapting| White::of_chromaticity(adapting.to_xy));
+    let (white, recorded) =
+        if adapted.is_some() { (settings.white.or(adapted), None) } else { (settings.white, recorded) };
+    let named = white.unwrap_or_default();
+    match (white, recorded, settings.white_luminance.or_else(of_frame)) {
         (Some(White::Absolute(white)), ..) => Ok(white),
         (None, Some(white), _) if settings.white_luminance.is_none() => Ok(white),
         (None, Some(white), Some(luminance)) => Ok(white.map(|value| value * luminance / white[1])),
@@ -309,6 +314,30 @@ mod tests {
         }
         let (_, counts) = through(&pixel([0.0, 100.0, 0.0], None), &settings(Space::Cct));
         assert_eq!((counts.not_finite, counts.off_locus), (0, 1));
+    }
+
+    /// What is white in the scene's light is white in that which colors are adapted to, whatever white the frame recorded; a white that is
+    /// named counts.
+    #[test]
+    fn colors_refer_to_the_light_that_they_are_adapted_to() {
+        const A_XY: [f64; 2] = [0.44758, 0.40745];
+        let scene = White::Chromaticity(A_XY).xyz(80.0);
+        let mut frame = pixel(scene.map(to_sample), None);
+        frame.header.metadata.color = Some(ColorRecord { white: Some(White::D50.xyz(80.0)), ..ColorRecord::of_xyz() });
+        let adapting = Some(Adapting { transform: Adaptation::Bradford, from_xy: A_XY, to_xy: D65_XY });
+        let asked = |space, white| XyzSettings { white, white_luminance: None, adapting, ..settings(space) };
+        let white_of = |made: &MemoryFrame| made.header.metadata.color.as_ref().unwrap().white.unwrap();
+        let (lab, _) = through(&frame, &asked(Space::Lab, None));
+        assert!(
+            lab.samples.iter().zip([100.0, 0.0, 0.0]).all(|(made, wanted)| (made - wanted).abs() < 1e-3),
+            "{:?}",
+            lab.samples
+        );
+        let (xyz, _) = through(&frame, &asked(Space::Xyz, None));
+        assert_eq!([white_of(&lab), white_of(&xyz)], [White::D65.xyz(80.0); 2]);
+        let (named, _) = through(&frame, &asked(Space::Lab, Some(White::D50)));
+        assert_eq!(white_of(&named), White::D50.xyz(80.0));
+        assert!(named.samples[2] < -10.0, "{:?}", named.samples);
     }
 
     /// A chromaticity that is white's for want of one is not known at all; luminance and lightness are.

@@ -145,7 +145,7 @@ pub(super) fn white(
             );
         }
         (Some(White::Absolute(white)), _) => white,
-        (Some(white @ (White::EqualEnergy | White::D50)), _) => white.xyz(luminance()?),
+        (Some(white @ (White::EqualEnergy | White::D50 | White::Chromaticity(_))), _) => white.xyz(luminance()?),
         (None, Some(known)) => match settings.white_luminance {
             Some(luminance) => known.map(|value| value * luminance / known[1]),
             None => known,

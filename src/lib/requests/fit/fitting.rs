@@ -171,9 +171,10 @@ impl Fitting<'_> {
     pub(super) fn white_in_words(&self) -> String {
         let name = match self.fit.white.or_daylight() {
             White::Absolute([x, y, z]) => return format!("XYZ {x} {y} {z}"),
-            White::D65 => "D65",
-            White::D50 => "D50",
-            White::EqualEnergy => "equal energy",
+            White::Chromaticity([x, y]) => format!("x {x}, y {y}"),
+            White::D65 => "D65".into(),
+            White::D50 => "D50".into(),
+            White::EqualEnergy => "equal energy".into(),
         };
         match self.fit.white.white_luminance {
             Some(luminance) => format!("{name} of {luminance} cd/m2"),

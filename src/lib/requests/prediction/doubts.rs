@@ -3,6 +3,7 @@
 use crate::camera::readout::ReadOut;
 use crate::cfa::Class;
 use crate::chain::{ChainPrediction, ChainStage};
+use crate::error::{Error, Result};
 use crate::metadata::AdcRecord;
 use crate::requests::notes::{Note, doubt_of_slope};
 use crate::text::percent;
@@ -13,6 +14,37 @@ const TELLING: f64 = 0.01;
 /// A warning of a converter whose slope looks like its inverse.
 pub(super) fn of_converter(readout: &ReadOut) -> Option<Note> {
     doubt_of_slope(&AdcRecord::of_readout(readout), readout.full_well_e)
+}
+
+/// A warning of a patch whose place has a noise of its own: it is predicted as anywhere in the middle of the sensor, by its place in the period of
+/// the filters, and by all amplifiers on average.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for a patch that is not on the sensor.
+pub(super) fn of_place(readout: &ReadOut, patch: Option<([usize; 2], [i64; 2])>, reach: usize) -> Result<Option<Note>> {
+    let Some((size, [x, y])) = patch else { return Ok(None) };
+    let sides = [(x, size[0], readout.width), (y, size[1], readout.height)];
+    let room = |(begin, extent, side): (i64, usize, u32)| {
+        begin.min(i64::from(side).saturating_sub(begin).saturating_sub_unsigned(extent as u64))
+    };
+    let room = sides.map(room).into_iter().min().unwrap_or(0);
+    if room < 0 {
+        let problem =
+            format!("the patch lies beyond the {}x{} photosites of the sensor", readout.width, readout.height);
+        return Err(Error::Usage(problem).change(&["patch_at"]));
+    }
+    let why = if readout.taps.is_some() {
+        "which amplifiers read it is not asked, and its noise is that of all on average"
+    } else if room < reach as i64 {
+        "at the edge of the sensor samples are mirrored, but its noise is that in the middle, up to a tenth less"
+    } else {
+        return Ok(None);
+    };
+    let text = format!(
+        "of the place of the patch that in the period of the filters alone counts: {why}; `measure --region` of a frame predicts it there"
+    );
+    Ok(Some(Note::Warning(text)))
 }
 
 /// A warning of samples that the converter cuts off in a scene.

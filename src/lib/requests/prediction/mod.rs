@@ -16,7 +16,9 @@ use crate::analysis::characterization::{CameraMatrix, signals};
 use crate::camera::optics::Exposure;
 use crate::camera::sensor::Sensor;
 use crate::cfa::{CfaPattern, Class};
-use crate::chain::{CameraSetup, ChainPrediction, ChainStage, Predictor, PredictorSettings, Uncertainty};
+use crate::chain::{
+    CameraSetup, ChainPrediction, ChainStage, Predictor, PredictorSettings, StagePrediction, Uncertainty,
+};
 use crate::color::Space;
 use crate::error::{Error, Result};
 use crate::formats::{data, spectral};
@@ -228,7 +230,11 @@ impl NoisePrediction {
         }
         let no_pixels = found.budgets.scenes().into_iter().find_map(|scene| scene.no_pixels.clone());
         if let Some(why) = no_pixels {
-            found.notes.push(Note::Warning(format!("nothing is predicted from demosaicking on: {why}")));
+            let has_pixels = |stage: &StagePrediction| stage.stage == ChainStage::Demosaicked;
+            let has_pixels = found.budgets.scenes().into_iter().any(|scene| scene.stages.iter().any(has_pixels));
+            let what =
+                if has_pixels { "of L*a*b* nothing is predicted" } else { "nothing is predicted from demosaicking on" };
+            found.notes.push(Note::Warning(format!("{what}: {why}")));
         }
         let stages = found.budgets.scenes().into_iter().flat_map(|scene| &scene.stages);
         let void = stages.filter(|stage| stage.stage == ChainStage::Lab).find_map(|stage| stage.void);
@@ -245,6 +251,7 @@ impl NoisePrediction {
             return Err(Error::Usage("a sweep scales the signal of a scene, but this one is dark".into()));
         }
         notes.extend(doubts::of_converter(sensor.readout()?));
+        notes.extend(doubts::of_place(sensor.readout()?, self.patch.zip(self.patch_at), self.method.reach())?);
         let color = self.color(&sensor, &mut notes)?;
         let is_absolute = color.as_ref().is_some_and(|color| !color.is_relative) && self.sweep.is_none();
         let true_xyz = radiance.filter(|_| is_absolute).and_then(|radiance| {
