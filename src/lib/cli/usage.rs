@@ -157,7 +157,9 @@ fn idle_option<'a>(command: &Command, words: &'a [String]) -> Option<&'a str> {
         parsed.is_ok()
     };
     let options = words.iter().enumerate().filter(|(_, word)| word.starts_with("--"));
-    let mut idle = options.filter(|(place, _)| [1, 2].into_iter().any(|of_it| is_enough_without(*place, of_it)));
+    let has_value = |place: usize| words.get(place + 1).is_some_and(|next| !next.starts_with('-'));
+    let mut idle =
+        options.filter(|(place, _)| is_enough_without(*place, 1) || has_value(*place) && is_enough_without(*place, 2));
     idle.next().map(|(_, word)| word.split('=').next().unwrap_or(word))
 }
 

@@ -405,9 +405,14 @@ fn codes_of(sensor: &Sensor) -> Metadata {
     codes
 }
 
+/// Levels of a curve that are enough for its bends, but for that at full well.
+const SMOOTH: usize = 60;
+/// From where a curve is drawn whose first level is dark, e⁻.
+const DIMMEST_E: f64 = 1.0;
+
 impl PredictedNoise {
-    /// The photon transfer curve of the brightest class, over the levels of the sweep, or up to full well; near full well,
-    /// where it bends, with more levels between.
+    /// The photon transfer curve of the brightest class, over the levels of the sweep, or up to full well, with more levels between: as many
+    /// as a curve takes that has no chords, and near full well, where it bends, more of them.
     ///
     /// # Errors
     ///
@@ -424,6 +429,11 @@ impl PredictedNoise {
         let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
         let high = levels.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         levels.extend(near_full_well(full_well_e).filter(|level| (low..=high).contains(level)));
+        let first = if low > 0.0 { low } else { DIMMEST_E.min(high) };
+        if first < high && self.sweep.is_some() {
+            let between = Sweep { start_e: first, end_e: high, count: SMOOTH, is_logarithmic: true };
+            levels.extend(between.levels().filter(|level| (low..=high).contains(level)));
+        }
         levels.sort_by(f64::total_cmp);
         levels.dedup();
         let levels = predictions(predictor, levels.into_iter(), electrons)?;
@@ -534,8 +544,9 @@ mod tests {
             let levels: Vec<f64> = curve.levels.iter().map(|level| level.electrons[1]).collect();
             let (low, high) = (f64::min(start_e, end_e), f64::max(start_e, end_e));
             assert_eq!((levels[0], *levels.last().unwrap()), (low, high));
-            // Levels between those of the sweep stand about full well alone.
-            assert_eq!(levels.len() > 5, (low..=high).contains(&curve.full_well_e), "{low} to {high}");
+            // More levels stand about full well.
+            assert!(levels.len() > SMOOTH);
+            assert_eq!(levels.len() > SMOOTH + 5, (low..=high).contains(&curve.full_well_e), "{low} to {high}");
         }
     }
 
