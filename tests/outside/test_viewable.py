@@ -12,7 +12,8 @@ PROFILE_DIGITS = 4 / 65536
 
 
 def profile_of(path):
-    """Colorants and lines of an ICC profile of parametric curves of type 4, straight on both sides of black [ICC.1:2022, 10.18]."""
+    """Colorants and lines of an ICC profile of parametric curves [ICC.1:2022, 10.18]: of type 1, which end at black, or of type 4, straight on
+    both sides of 0."""
     with tifffile.TiffFile(path) as file:
         tag = file.pages[0].tags.get(34675)
         if tag is None:
@@ -28,9 +29,9 @@ def profile_of(path):
     lines = []
     for name in (b"rTRC", b"gTRC", b"bTRC"):
         kind, values = tags[name][8:10], fixed(tags[name][12:])
-        power, slope, offset, below, joint, lift, offset_below = values
-        assert kind == b"\0\4" and (power, below, lift, offset_below) == (1, slope, 0, offset), (kind, values)
-        assert abs(slope * joint + offset) <= slope * PROFILE_DIGITS, values
+        slope, offset = values[1], values[2]
+        wanted = (b"\0\4", [1, slope, 0, slope, 0, 0, 0]) if offset == 0 else (b"\0\1", [1, slope, offset])
+        assert (kind, list(values)) == wanted, (kind, values)
         lines.append([slope, offset])
     return colorants, np.array(lines)
 

@@ -115,11 +115,12 @@ impl Light {
         let colorants = adapt * self.xyz_from_shares;
         let colorant = |j: usize| Xyzd { x: colorants[(0, j)], y: colorants[(1, j)], z: colorants[(2, j)] };
         [profile.red_colorant, profile.green_colorant, profile.blue_colorant] = [0, 1, 2].map(colorant);
-        // Straight on both sides of 0: of the curve that ends there nothing is left of what noise makes negative. Above d it is (aX + b)ᵍ + e,
-        // below cX + f \[ICC2022, Table 68].
+        // Straight on both sides of 0, (aX + b)ᵍ + e above d and cX + f below \[ICC2022, Table 68]: of the curve that ends at 0 nothing is left
+        // of what noise makes negative. Codes have such below their black alone, and there darktable takes no other curve.
         #[expect(clippy::cast_possible_truncation, reason = "the profile holds 16 bits behind the point")]
-        let curve = |[slope, offset]: [f64; 2]| {
-            [1.0, slope, offset, slope, -offset / slope, 0.0, offset].map(|parameter| parameter as f32).to_vec()
+        let curve = |[slope, offset]: [f64; 2]| match offset == 0.0 {
+            true => [1.0, slope, 0.0, slope, 0.0, 0.0, 0.0].map(|parameter| parameter as f32).to_vec(),
+            false => [1.0, slope, offset].map(|parameter| parameter as f32).to_vec(),
         };
         let curves = lines.map(|line| Some(ToneReprCurve::Parametric(curve(line))));
         [profile.red_trc, profile.green_trc, profile.blue_trc] = curves;
