@@ -122,7 +122,7 @@ impl Calibration {
     }
 
     /// Camera from XYZ for a white, AB · CC · CM. Of two illuminants CM and CC are linear in the reciprocal of its correlated color
-    /// temperature between theirs, and constant beyond; of three they are means by [`shares_of_three`].
+    /// temperature between theirs, and constant beyond; of three they are means by the weights of the DNG SDK.
     pub fn camera_from_xyz(&self, observer: &Observer, white_xy: [f64; 2]) -> Matrix3<f64> {
         self.at_shares(self.shares(observer, white_xy))
     }
