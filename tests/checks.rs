@@ -6,24 +6,23 @@
 use crate::support;
 use cyanometer::analysis::statistics::Verdict;
 use cyanometer::analysis::statistics::{Laws, Region, RegionReport, Saturated, measure};
-use cyanometer::color::{Space, White};
+use cyanometer::color::Space;
 use cyanometer::metadata::Scene;
 use cyanometer::numerics::significance::{of_chi_square, of_smallest};
 use cyanometer::propagation::Equations;
 use cyanometer::random::Source;
-use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
 use cyanometer::stages::darks::{DarkFrames, LessDarks};
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
-use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::{MemoryFrame, Stage, run};
 use rayon::prelude::*;
 use support::alarms::{corrected, judge, over_seeds, regions_among};
+use support::chain::{colored, digitized};
 use support::misses::trials;
-use support::{at, expected, sensor, through};
+use support::{at, expected, through};
 
 /// The frame of a uniform scene.
 fn scene(size: [usize; 2], electrons: [f32; 3]) -> MemoryFrame {
@@ -37,26 +36,9 @@ fn noisy(scene: &MemoryFrame, seed: u64) -> MemoryFrame {
     through(scene, &AddNoise::new(&scene.header, &settings).unwrap())
 }
 
-fn digitized(frame: &MemoryFrame) -> MemoryFrame {
-    through(frame, &Digitize::new(&frame.header, &AdcSettings::default()).unwrap())
-}
-
 fn demosaicked(codes: &MemoryFrame, method: Method) -> MemoryFrame {
     let plane = through(codes, &Mosaic::new(&codes.header, None).unwrap());
     through(&plane, &Demosaic::new(&plane.header, method, Black::Auto, None).unwrap())
-}
-
-fn colored(camera: &MemoryFrame, space: Space) -> MemoryFrame {
-    let settings = ColorSettings {
-        is_relative: false,
-        xyz_from_camera: sensor().xyz_from_camera.unwrap(),
-        method: None,
-        residual: None,
-        space,
-        white: White::D65,
-        white_luminance: None,
-    };
-    through(camera, &ToXyz::new(&camera.header, &settings).unwrap())
 }
 
 fn regions(frame: &MemoryFrame, regions: &[Region], equations: Equations) -> Vec<RegionReport> {

@@ -3,9 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
 use crate::support::alarms::{judge, over_seeds};
-use crate::support::cmos::{
-    SEEDS, colored, demosaicked, digitized, less_darks, noisy, plane_of, regions, scene, settings, with_readout,
-};
+use crate::support::chain::{colored, demosaicked, digitized, less_darks, noisy, plane_of, settings, with_readout};
+use crate::support::cmos::{SEEDS, regions, scene};
 use crate::support::misses::trials;
 use crate::support::{assert_same, at, crop, expected, through, through_cuts};
 use cyanometer::analysis::statistics::Region;

@@ -2,9 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
+use crate::support::chain::{demosaicked, digitized, less_darks, noisy, plane_of, settings, with_readout};
 use crate::support::cmos::{
-    before_demosaicking, demosaicked, digitized, drifting, less_darks, noisy, plane_of, regions, regions_cover,
-    regions_or, scene, settings, several_taps, sigma_covers, tapped, tapped_with_lines, with_readout,
+    before_demosaicking, drifting, regions, regions_cover, regions_or, scene, several_taps, sigma_covers, tapped,
+    tapped_with_lines,
 };
 use crate::support::misses::trials;
 use crate::support::{assert_same, crop, through, through_cuts};

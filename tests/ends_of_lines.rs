@@ -3,7 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-use crate::support::cmos::{cmos, demosaicked, digitized, noisy, plane_of, scene, settings, with_readout};
+use crate::support::chain::{demosaicked, digitized, noisy, plane_of, settings, with_readout};
+use crate::support::cmos::{cmos, scene};
 use cyanometer::analysis::statistics::{Laws, Region, Saturated, measure_among};
 use cyanometer::camera::taps::{TapLayout, Taps};
 use cyanometer::propagation::Equations;

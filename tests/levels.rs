@@ -7,7 +7,7 @@ use crate::support;
 use cyanometer::analysis::statistics::{Report, Saturated, measure};
 use cyanometer::camera::levels::{BlackLevel, WhiteLevel};
 use cyanometer::cfa::{CfaPattern, Class, FilterArray};
-use cyanometer::color::{Space, White, matrix};
+use cyanometer::color::{Space, matrix};
 use cyanometer::error::Result;
 use cyanometer::formats::picture::{PictureSettings, write_png};
 use cyanometer::formats::yaml::{parse_metadata, write_metadata};
@@ -22,10 +22,11 @@ use cyanometer::stages::darks::DarkStack;
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
-use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
+use cyanometer::stages::to_xyz::ToXyz;
 use cyanometer::stream::{MemoryFrame, Stage};
 use cyanometer::units::QuantityKind;
 use nalgebra::Vector3;
+use support::chain::color_settings;
 use support::*;
 
 /// None of them a 32-bit float.
@@ -178,7 +179,10 @@ fn levels_by_site_that_no_word_is_left_for_are_refused() {
     }
     let mut three = frame(header(QuantityKind::Adu, Geometry::new(6, 4, &["R", "G", "B"])), |_, _, _| 500.0);
     three.header.metadata.black_level_adu = Some(BlackLevel::Sites(SITES));
-    refused(ToXyz::new(&three.header, &to_color(Space::Xyz)), "its black level differs among photosites; subtract it");
+    refused(
+        ToXyz::new(&three.header, &color_settings(Space::Xyz)),
+        "its black level differs among photosites; subtract it",
+    );
     let mut camera = Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None).unwrap();
     camera.header_mut().metadata.black_level_adu = Some(BlackLevel::Sites(SITES));
     refused(WithSigma::of_demosaicking(camera), "its black level differs among photosites");
@@ -186,18 +190,6 @@ fn levels_by_site_that_no_word_is_left_for_are_refused() {
     let mut without = codes.header.clone();
     without.metadata.black_level_adu = None;
     refused(correct(&without, Black::Auto, None), "but not the level itself; write `black_level_adu`");
-}
-
-fn to_color(space: Space) -> ColorSettings {
-    ColorSettings {
-        is_relative: false,
-        xyz_from_camera: sensor().xyz_from_camera.unwrap(),
-        method: None,
-        residual: None,
-        space,
-        white: White::D65,
-        white_luminance: None,
-    }
 }
 
 /// Charge transfer is undone of what is left once each photosite has lost its black.
@@ -289,7 +281,7 @@ fn white_follows_what_is_subtracted_from_its_class() {
     codes.header.metadata.black_level_adu = Some(100.0.into());
     let camera = Demosaic::new(&codes.header, Method::Bilinear, Black::Auto, None).unwrap();
     assert_eq!(camera.header().metadata.white_level_adu, Some(WhiteLevel::Classes([900.0, 1900.0, 2900.0])));
-    let lab = ToXyz::new(camera.header(), &to_color(Space::Lab)).unwrap();
+    let lab = ToXyz::new(camera.header(), &color_settings(Space::Lab)).unwrap();
     // By the white one class is full, and no other beyond it.
     let inverse = matrix(&sensor().xyz_from_camera.unwrap()).try_inverse().unwrap();
     let signals = inverse * Vector3::from(lab.white()) * EXPOSURE.exposure_s_sr();
@@ -428,7 +420,7 @@ fn a_black_level_that_nobody_states_is_not_taken_as_zero() {
     refused(correct(&codes.header, Black::Auto, None), complaint);
     let three = header(QuantityKind::Adu, Geometry::new(6, 4, &["R", "G", "B"]));
     let three = FrameHeader { name: "test".into(), ..three };
-    refused(ToXyz::new(&three, &to_color(Space::Xyz)), complaint);
+    refused(ToXyz::new(&three, &color_settings(Space::Xyz)), complaint);
     // Who says that there is none goes on.
     for black in [Black::None, Black::Level(0.0.into()), Black::Level(70.0.into())] {
         let made = Demosaic::new(&codes.header, Method::Bilinear, black, None).unwrap();

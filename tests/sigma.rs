@@ -24,6 +24,7 @@ use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::{MemoryFrame, Stage};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
+use support::chain::color_settings;
 use support::{at, expected, sensor, through};
 
 const WIDTH: usize = 26;
@@ -55,16 +56,7 @@ fn demosaicked(plane: &MemoryFrame, method: Method) -> MemoryFrame {
 }
 
 fn coloring(camera: &FrameHeader, space: Space) -> WithSigma<ToXyz> {
-    let settings = ColorSettings {
-        is_relative: false,
-        xyz_from_camera: sensor().xyz_from_camera.unwrap(),
-        method: None,
-        residual: None,
-        space,
-        white: White::D65,
-        white_luminance: None,
-    };
-    WithSigma::of_conversion(ToXyz::new(camera, &settings).unwrap(), camera).unwrap()
+    WithSigma::of_conversion(ToXyz::new(camera, &color_settings(space)).unwrap(), camera).unwrap()
 }
 
 /// Many exposures of as many sensors, demosaicked with standard deviations or turned into colors with them.

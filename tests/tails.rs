@@ -6,24 +6,20 @@ use crate::support;
 use cyanometer::analysis::statistics::{Region, RegionReport, Saturated, measure};
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::cfa::CfaPattern;
-use cyanometer::color::{Space, White};
+use cyanometer::color::Space;
 use cyanometer::metadata::{PoissonKind, Scene};
 use cyanometer::numerics::vectors::Instructions;
 use cyanometer::propagation::{Equations, of_frame};
 use cyanometer::random::Source;
 use cyanometer::random::philox::philox4x32_10;
-use cyanometer::stages::adc::{AdcSettings, Digitize};
-use cyanometer::stages::black::Black;
-use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
-use cyanometer::stages::darks::{DarkFrames, LessDarks};
-use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stages::demosaic::Method;
 use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
-use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
-use cyanometer::stream::{MemoryFrame, Stage, run};
+use cyanometer::stream::MemoryFrame;
 use rayon::prelude::*;
 use support::alarms::{corrected, judge, over_seeds};
-use support::{assert_same, at, crop, expected, sensor, through, through_cuts};
+use support::chain::{colored, demosaicked, digitized, less_darks, noisy, plane_of, settings, with_readout};
+use support::{assert_same, at, crop, expected, through, through_cuts};
 
 /// A CMOS sensor with tails of both kinds.
 fn tailed(readout: &mut ReadOut) {
@@ -42,65 +38,11 @@ fn tailed(readout: &mut ReadOut) {
     readout.adu_per_e = 0.4;
 }
 
-fn with_readout(frame: &mut MemoryFrame, change: impl Fn(&mut ReadOut)) {
-    let sensor = frame.header.metadata.sensor.as_mut().unwrap();
-    change(sensor.readout.as_mut().unwrap());
-    sensor.readout.as_ref().unwrap().check().unwrap();
-}
-
 fn scene(size: [usize; 2], electrons: [f32; 3], change: impl Fn(&mut ReadOut)) -> MemoryFrame {
     let mut frame = expected(size[0], size[1], |_, _, class| electrons[class as usize]);
     frame.header.metadata.scene = Some(Scene::uniform("test", electrons.map(f64::from)));
     with_readout(&mut frame, change);
     frame
-}
-
-fn settings(seed: u64) -> NoiseSettings {
-    NoiseSettings { seed, sensor_seed: seed, ..Default::default() }
-}
-
-fn noisy(scene: &MemoryFrame, settings: &NoiseSettings) -> MemoryFrame {
-    through(scene, &AddNoise::new(&scene.header, settings).unwrap())
-}
-
-fn digitized(frame: &MemoryFrame) -> MemoryFrame {
-    through(frame, &Digitize::new(&frame.header, &AdcSettings::default()).unwrap())
-}
-
-fn plane_of(codes: &MemoryFrame) -> MemoryFrame {
-    through(codes, &Mosaic::new(&codes.header, None).unwrap())
-}
-
-fn demosaicked(plane: &MemoryFrame, method: Method) -> MemoryFrame {
-    through(plane, &Demosaic::new(&plane.header, method, Black::Auto, None).unwrap())
-}
-
-fn colored(camera: &MemoryFrame, space: Space) -> MemoryFrame {
-    let settings = ColorSettings {
-        is_relative: false,
-        xyz_from_camera: sensor().xyz_from_camera.unwrap(),
-        method: None,
-        residual: None,
-        space,
-        white: White::D65,
-        white_luminance: None,
-    };
-    through(camera, &ToXyz::new(&camera.header, &settings).unwrap())
-}
-
-/// A plane less the mean of so many dark frames of the same sensor.
-fn less_darks(plane: &MemoryFrame, light: &MemoryFrame, seed: u64, frames: u32) -> MemoryFrame {
-    let mut dark = light.clone();
-    dark.samples.fill(0.0);
-    dark.header.metadata.scene = Some(Scene::uniform("test", [0.0; 3]));
-    let taken = |frame| plane_of(&digitized(&noisy(&dark, &NoiseSettings { frame, ..settings(seed) })));
-    let mut darks = DarkFrames::of((1..=frames).map(taken).collect()).unwrap().unwrap();
-    let settings = CorrectionSettings { black: Black::None, cte: None };
-    let stage = CorrectFrame::new(&plane.header, &settings, Some(darks.stack())).unwrap();
-    let mut source = MemoryFrame::new(plane.header.clone(), plane.samples.clone());
-    let mut corrected = MemoryFrame::new(stage.header().clone(), Vec::new());
-    run(&stage, &mut LessDarks::new(&mut source, &mut darks), &mut corrected, &mut |_| ()).unwrap();
-    MemoryFrame::new(corrected.header, corrected.samples)
 }
 
 /// Nothing where nothing is predicted.

@@ -4,9 +4,11 @@
 
 use crate::support;
 use crate::support::alarms::{judge, over_seeds};
+use crate::support::chain::{
+    color_settings, colored, demosaicked, digitized, less_darks, noisy, plane_of, settings, with_readout,
+};
 use crate::support::cmos::{
-    SEEDS, before_demosaicking, color_settings, colored, demosaicked, digitized, less_darks, noisy, plane_of, regions,
-    regions_cover, settings, several_taps, sigma_covers, tapped, tapped_with_lines, with_readout,
+    SEEDS, before_demosaicking, regions, regions_cover, several_taps, sigma_covers, tapped, tapped_with_lines,
 };
 use crate::support::misses::trials;
 use crate::support::{at, crop, sensor};

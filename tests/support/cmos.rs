@@ -3,25 +3,18 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
 use super::alarms::{judge, over_seeds, regions_among};
-use super::{at, expected, sensor, through};
+use super::chain::{demosaicked, digitized, less_darks, noisy, plane_of, settings, with_readout};
+use super::{at, expected};
 use cyanometer::analysis::statistics::{Laws, Region, RegionReport, Saturated, measure};
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::camera::taps::{TapLayout, Taps};
-use cyanometer::color::{Space, White};
 use cyanometer::metadata::Scene;
 use cyanometer::numerics::significance::{of_chi_square, of_smallest};
 use cyanometer::propagation::Equations;
 use cyanometer::propagation::covariance::symmetric;
 use cyanometer::propagation::pixels::PixelNoise;
-use cyanometer::stages::adc::{AdcSettings, Digitize};
-use cyanometer::stages::black::Black;
-use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
-use cyanometer::stages::darks::{DarkFrames, LessDarks};
-use cyanometer::stages::demosaic::{Demosaic, Method};
-use cyanometer::stages::mosaic::Mosaic;
-use cyanometer::stages::noise::{AddNoise, NoiseSettings};
-use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
-use cyanometer::stream::{MemoryFrame, Stage, run};
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stream::MemoryFrame;
 use rayon::prelude::*;
 
 /// Seeds of which a third is tried, or all.
@@ -47,12 +40,6 @@ pub fn cmos(readout: &mut ReadOut) {
     readout.adu_per_e = 0.4;
 }
 
-pub fn with_readout(frame: &mut MemoryFrame, change: impl Fn(&mut ReadOut)) {
-    let sensor = frame.header.metadata.sensor.as_mut().unwrap();
-    change(sensor.readout.as_mut().unwrap());
-    sensor.readout.as_ref().unwrap().check().unwrap();
-}
-
 /// The frame of a uniform scene.
 pub fn scene(size: [usize; 2], electrons: [f32; 3]) -> MemoryFrame {
     let mut frame = expected(size[0], size[1], |_, _, class| electrons[class as usize]);
@@ -61,59 +48,8 @@ pub fn scene(size: [usize; 2], electrons: [f32; 3]) -> MemoryFrame {
     frame
 }
 
-pub fn settings(seed: u64) -> NoiseSettings {
-    NoiseSettings { seed, sensor_seed: seed, ..Default::default() }
-}
-
-pub fn noisy(scene: &MemoryFrame, settings: &NoiseSettings) -> MemoryFrame {
-    through(scene, &AddNoise::new(&scene.header, settings).unwrap())
-}
-
-pub fn digitized(frame: &MemoryFrame) -> MemoryFrame {
-    through(frame, &Digitize::new(&frame.header, &AdcSettings::default()).unwrap())
-}
-
-pub fn plane_of(codes: &MemoryFrame) -> MemoryFrame {
-    through(codes, &Mosaic::new(&codes.header, None).unwrap())
-}
-
-pub fn demosaicked(plane: &MemoryFrame, method: Method) -> MemoryFrame {
-    through(plane, &Demosaic::new(&plane.header, method, Black::Auto, None).unwrap())
-}
-
-pub fn color_settings(space: Space) -> ColorSettings {
-    ColorSettings {
-        is_relative: false,
-        xyz_from_camera: sensor().xyz_from_camera.unwrap(),
-        method: None,
-        residual: None,
-        space,
-        white: White::D65,
-        white_luminance: None,
-    }
-}
-
-pub fn colored(camera: &MemoryFrame, space: Space) -> MemoryFrame {
-    through(camera, &ToXyz::new(&camera.header, &color_settings(space)).unwrap())
-}
-
 pub fn regions(frame: &MemoryFrame, regions: &[Region]) -> Vec<RegionReport> {
     regions_among(&mut Laws::default(), frame, regions, Equations::Exact)
-}
-
-/// A plane less the mean of so many dark frames of the same sensor.
-pub fn less_darks(plane: &MemoryFrame, light: &MemoryFrame, seed: u64, frames: u32) -> MemoryFrame {
-    let mut dark = light.clone();
-    dark.samples.fill(0.0);
-    dark.header.metadata.scene = Some(Scene::uniform("test", [0.0; 3]));
-    let taken = |frame| plane_of(&digitized(&noisy(&dark, &NoiseSettings { frame, ..settings(seed) })));
-    let mut darks = DarkFrames::of((1..=frames).map(taken).collect()).unwrap().unwrap();
-    let settings = CorrectionSettings { black: Black::None, cte: None };
-    let stage = CorrectFrame::new(&plane.header, &settings, Some(darks.stack())).unwrap();
-    let mut source = MemoryFrame::new(plane.header.clone(), plane.samples.clone());
-    let mut corrected = MemoryFrame::new(stage.header().clone(), Vec::new());
-    run(&stage, &mut LessDarks::new(&mut source, &mut darks), &mut corrected, &mut |_| ()).unwrap();
-    MemoryFrame::new(corrected.header, corrected.samples)
 }
 
 /// Layouts with numbers of taps that differ in everything.

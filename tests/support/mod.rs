@@ -5,6 +5,7 @@
 pub mod advised;
 pub mod alarms;
 pub mod bounds;
+pub mod chain;
 pub mod cmos;
 pub mod dng;
 pub mod fits;

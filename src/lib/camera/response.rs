@@ -155,19 +155,17 @@ impl SpectralResponse {
     ) -> Result<GridWeights> {
         let all = self.electron_weights(sensor, exposure, &all_nm, &widths)?;
         let kept: Vec<usize> = (0..all_nm.len()).filter(|&i| all.iter().any(|class| class[i] != 0.0)).collect();
-        if kept.is_empty() && grid.start_nm == grid.end_nm {
-            let nm = grid.start_nm;
-            return Err(Error::Data(format!(
-                "from {nm} to {nm} nm there is nothing to sum over; for light of one wavelength give it some width, as from {} to {} nm",
-                nm - 0.5,
-                nm + 0.5
-            )));
-        }
         if kept.is_empty() {
-            return Err(Error::Data(format!(
-                "the sensor {} does not respond between {} and {} nm",
-                sensor.name, grid.start_nm, grid.end_nm
-            )));
+            let (start_nm, end_nm) = (grid.start_nm, grid.end_nm);
+            return Err(Error::Data(if start_nm == end_nm {
+                format!(
+                    "from {start_nm} to {end_nm} nm there is nothing to sum over; for light of one wavelength give it some width, as from {} to {} nm",
+                    start_nm - 0.5,
+                    end_nm + 0.5
+                )
+            } else {
+                format!("the sensor {} does not respond between {start_nm} and {end_nm} nm", sensor.name)
+            }));
         }
         let wavelengths_nm = kept.iter().map(|&i| all_nm[i]).collect();
         let weights = all.each_ref().map(|class| kept.iter().map(|&i| class[i]).collect());

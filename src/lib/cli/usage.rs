@@ -115,8 +115,7 @@ fn in_words(meant: Option<String>) -> String {
 /// The complaint of an argument that is none here.
 fn unknown(argument: &str, command: &Command, words: &[String]) -> String {
     let hint = in_words(meant(argument, command, words).or_else(|| near_option(argument, command)));
-    let of_another = || elsewhere(argument, command).unwrap_or_default();
-    let hint = if hint.is_empty() { of_another() } else { hint };
+    let hint = if hint.is_empty() { elsewhere(argument).unwrap_or_default() } else { hint };
     let hint = output_hint(argument, command, words).map_or(hint, |output| format!("; {output}"));
     let hint = too_many(argument, command, words).map_or(hint, |taken| format!("; {taken}"));
     let hint = in_quotes(argument, command, words).map_or(hint, |quoted| format!("; write {quoted}"));
@@ -127,14 +126,17 @@ fn unknown(argument: &str, command: &Command, words: &[String]) -> String {
     format!("unknown option or extra argument `{argument}`{hint}")
 }
 
-/// Where an option is at home that this program lacks.
-fn elsewhere(argument: &str, command: &Command) -> Option<String> {
+/// Where an option is at home that this program lacks, behind a complaint.
+fn elsewhere(argument: &str) -> Option<String> {
     let typed = argument.strip_prefix("--")?;
-    if command.get_arguments().any(|option| option.get_long() == Some(typed)) {
-        return None;
+    if typed == "list" {
+        return Some("; `cyanometer list` tells the spectra, sensors and tables that come with the programs".into());
     }
-    let (_, place) = ELSEWHERE.into_iter().find(|(option, _)| *option == typed)?;
-    Some(format!("; {place}"))
+    if typed == "template" {
+        return Some("; `cyanometer template sensor`, `… matrix` or `… metadata` prints a file to fill in".into());
+    }
+    let (program, _) = ELSEWHERE.into_iter().find(|(_, options)| options.contains(&typed))?;
+    Some(format!("; it is an option of `{program}`"))
 }
 
 /// An option with a value behind an equals sign that was taken for an option of its own: `--size -5x480`.
@@ -228,25 +230,16 @@ fn respelled(value: &str, command: &Command, words: &[String]) -> Option<String>
     })
 }
 
-/// What is said of options that other programs have.
-const ELSEWHERE: [(&str, &str); 17] = [
-    ("list", "`cyanometer list` tells the spectra, sensors and tables that come with the programs"),
-    ("template", "`cyanometer template sensor`, `… matrix` or `… metadata` prints a file to fill in"),
-    ("electrons", "it is an option of `render-radiance`"),
-    ("exposure", "it is an option of `render-radiance`"),
-    ("expose-to", "it is an option of `render-radiance`"),
-    ("seed", "it is an option of `add-noise`"),
-    ("sensor-seed", "it is an option of `add-noise`"),
-    ("bits", "it is an option of `digitize`"),
-    ("slope", "it is an option of `digitize`"),
-    ("bias", "it is an option of `digitize`"),
-    ("dark", "it is an option of `correct-frame`"),
-    ("flat", "it is an option of `correct-frame`"),
-    ("method", "it is an option of `demosaic`"),
-    ("matrix", "it is an option of `to-xyz`"),
-    ("space", "it is an option of `to-xyz`"),
-    ("check", "it is an option of `measure`"),
-    ("false-color", "it is an option of `preview`"),
+/// Options that people give to other programs than those that have them.
+const ELSEWHERE: [(&str, &[&str]); 8] = [
+    ("render-radiance", &["electrons", "exposure", "expose-to"]),
+    ("add-noise", &["seed", "sensor-seed"]),
+    ("digitize", &["bits", "slope", "bias"]),
+    ("correct-frame", &["dark", "flat"]),
+    ("demosaic", &["method"]),
+    ("to-xyz", &["matrix", "space"]),
+    ("measure", &["check"]),
+    ("preview", &["false-color"]),
 ];
 
 /// Lists of numbers, of which an option that takes such takes one.

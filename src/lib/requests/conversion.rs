@@ -192,8 +192,7 @@ impl Conversion {
 
     /// The white that is named, or what colors are adapted to, or D65.
     fn reference_white(&self, adapting: Option<Adapting>) -> White {
-        let adapted = || adapting.map(|adapting| White::of_chromaticity(adapting.to_xy));
-        self.white.white.or_else(adapted).unwrap_or_default()
+        self.white.white.or(adapting.map(Adapting::white)).unwrap_or_default()
     }
 
     /// What to say where the light of the colors is not the white that they are referred to.

@@ -61,6 +61,11 @@ impl Adapting {
         self.transform.between(self.from_xy, self.to_xy).map_err(Error::Usage)
     }
 
+    /// What colors are referred to where no white is named.
+    pub fn white(self) -> White {
+        White::of_chromaticity(self.to_xy)
+    }
+
     /// The record of it.
     pub fn record(self) -> AdaptationRecord {
         let Self { transform, from_xy, to_xy } = self;
@@ -193,7 +198,7 @@ fn reference_white(input: &FrameHeader, settings: &XyzSettings) -> Result<[f64; 
     let recorded = metadata.color.as_ref().and_then(|color| color.white);
     let of_frame = || if is_relative { Some(1.0) } else { recorded.map(|white| white[1]) };
     // What is white in the scene has become the light that colors are adapted to.
-    let adapted = settings.adapting.map(|adapting| White::of_chromaticity(adapting.to_xy));
+    let adapted = settings.adapting.map(Adapting::white);
     let (white, recorded) =
         if adapted.is_some() { (settings.white.or(adapted), None) } else { (settings.white, recorded) };
     let named = white.unwrap_or_default();
