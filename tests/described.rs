@@ -111,6 +111,68 @@ fn flats_and_darks_of_codes_alone_are_described() {
     assert!(said(&line).ends_with("its exposure time is 0.02 s by the list, not 0.01 s; leave out --exposure\n"));
 }
 
+/// A plane among several channels is known by its name, and told.
+#[test]
+fn a_plane_behind_a_filter_array_is_found_by_its_name() {
+    let shop = Workshop::new();
+    shop.pipe("render-radiance --electrons 900,900,900 --size 8x6 | mosaic | add-noise | digitize -o plane.exr");
+    let plane = shop.frame("plane.exr");
+    let bare = "demosaic plane.exr --channel Y -o wanted.exr --quiet";
+    shop.run(bare, &[]);
+    for (names, found) in [
+        (vec!["raw", "mask"], Some("raw")),
+        (vec!["cfa.Y", "depth.Z"], Some("cfa.Y")),
+        (vec!["R", "G", "B", "Bayer"], Some("Bayer")),
+        (vec!["left", "right"], None),
+        (vec!["raw", "cfa"], None),
+    ] {
+        let mut header = plane.header.clone();
+        header.geometry = header.geometry.with_channels(&names);
+        header.metadata = cyanometer::metadata::Metadata::new(cyanometer::units::QuantityKind::Unspecified);
+        let row = plane.header.geometry.width;
+        let samples: Vec<f32> =
+            plane.samples.chunks(row).flat_map(|row| names.iter().flat_map(move |_| row.iter().copied())).collect();
+        shop.write("several.exr", &header, &samples);
+        fs::remove_file(shop.path("several.exr.yaml")).ok();
+        let line = "demosaic several.exr --cfa grbg --black 78 --white 4095 -o found.exr";
+        let Some(found) = found else {
+            assert!(shop.said(line, BAD_USAGE).contains("which --channel NAME takes"), "{names:?}");
+            continue;
+        };
+        let said = shop.said(line, 0);
+        assert!(said.contains(&format!("its channel `{found}` is taken for the plane")), "{names:?}: {said}");
+        let with_channel =
+            format!("demosaic several.exr --channel {found} --cfa grbg --black 78 --white 4095 -o named.exr");
+        shop.said(&with_channel, 0);
+        assert_eq!(shop.frame("found.exr").samples, shop.frame("named.exr").samples, "{names:?}");
+    }
+}
+
+/// Without the exposure that absolute XYZ take they are relative, by a matrix of whatever kind: D65 that saturates the camera has Y = 1.
+#[test]
+fn colors_of_an_unknown_exposure_are_relative() {
+    let shop = Workshop::new();
+    shop.pipe("render-radiance --electrons 9000,9000,9000 --size 8x6 | mosaic | add-noise | digitize -o plane.exr");
+    shop.run("demosaic plane.exr -o rgb.exr", &[]);
+    shop.run("to-xyz rgb.exr --matrix sensor -o xyz.exr", &[]);
+    let absolute = shop.frame("xyz.exr");
+    let rgb = shop.frame("rgb.exr");
+    let mut header = rgb.header.clone();
+    header.metadata.exposure = None;
+    shop.write("bare.exr", &header, &rgb.samples);
+    for matrix in ["", "--matrix sensor"] {
+        let said = shop.said(&format!("to-xyz bare.exr {matrix} -o relative.exr"), 0);
+        assert!(said.contains("its exposure is not known: XYZ are relative, Y = 1 for the D65"), "{said}");
+        let relative = shop.frame("relative.exr");
+        // One factor: that by which the recorded white of absolute XYZ has Y = 1.
+        let white = absolute.header.metadata.color.as_ref().unwrap().white.unwrap()[1];
+        for (relative, absolute) in relative.samples.iter().zip(&absolute.samples) {
+            let off = f64::from(*relative) * white - f64::from(*absolute);
+            assert!(off.abs() < 1e-5 * f64::from(*absolute).abs(), "{relative} {absolute} {white}");
+        }
+    }
+}
+
 /// One channel of frames of three planes is measured as a camera without filters.
 #[test]
 fn a_channel_of_flats_is_measured_alone() {

@@ -404,6 +404,11 @@ fn places_tags_comments_and_attributes_that_contradict_are_told() {
         said.contains("moved.exr: it begins at column 8, row 4 of the sensor, but xyz.exr at column 0, row 0"),
         "{said}"
     );
+    // Another light.
+    shop.run("to-xyz xyz.exr --scene-white d65 --adapt-to d50 -o d50.exr", &[]);
+    let said = shop.said("color-difference xyz.exr d50.exr", 0);
+    assert!(said.contains("d50.exr: its white has x 0.3457, y 0.3585, that of xyz.exr x 0.3127, y 0.3290"), "{said}");
+    shop.run("color-difference xyz.exr d50.exr --white d50", &[]);
     // A factor in a comment.
     let table = "# scale factor 1e-3\nwavelength_nm,L (W m-2 sr-1 nm-1)\n400,0.01\n700,0.01\n";
     fs::write(shop.path("t.csv"), table).unwrap();

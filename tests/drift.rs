@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
-use crate::support::chain::{demosaicked, digitized, less_darks, noisy, plane_of, settings, with_readout};
+use crate::support::chain::{colored, demosaicked, digitized, less_darks, noisy, plane_of, settings, with_readout};
 use crate::support::cmos::{
     before_demosaicking, drifting, regions, regions_cover, regions_or, scene, several_taps, sigma_covers, tapped,
     tapped_with_lines,
@@ -12,6 +12,7 @@ use crate::support::{assert_same, crop, through, through_cuts};
 use cyanometer::analysis::statistics::Region;
 use cyanometer::camera::linearity::Linearization;
 use cyanometer::camera::taps::{TapLayout, Taps};
+use cyanometer::color::Space;
 use cyanometer::numerics::significance::{of_chi_square, of_smallest};
 use cyanometer::numerics::vectors::Instructions;
 use cyanometer::propagation::pixels::PixelNoise;
@@ -70,6 +71,25 @@ fn drifting_frames_raise_false_alarms_at_the_stated_rate() {
         let sites = |seed: u64| before_demosaicking(&scene, seed);
         let some = Region { x: 2, y: 3, width: 17, height: 12 };
         regions_cover(&format!("drift over {rows} rows"), &[Region { x: 0, y: 0, width: 24, height: 19 }, some], sites);
+    }
+}
+
+/// So do pixels and colors, of a drift that is a part of the noise and of one that is most of it.
+#[test]
+fn drifting_pixels_raise_false_alarms_at_the_stated_rate() {
+    let parts = [Region { x: 0, y: 0, width: 24, height: 19 }, Region { x: 2, y: 3, width: 17, height: 12 }];
+    for (drift_e, rows) in [(7.0, 3.3), (80.0, 20.0), (80.0, 170.0)] {
+        let mut scene = drifting([24, 19], [900.0, 2500.0, 1800.0], rows);
+        with_readout(&mut scene, |readout| readout.black_drift_e = drift_e);
+        let made = |seed: u64| {
+            let plane = plane_of(&digitized(&noisy(&scene, &settings(seed))));
+            let less = demosaicked(&less_darks(&plane, &scene, seed, 2), Method::Malvar);
+            let [bilinear, effective] =
+                [Method::Bilinear, Method::EffectiveColor].map(|method| demosaicked(&plane, method));
+            let xyz = colored(&effective, Space::Xyz);
+            vec![bilinear, less, xyz]
+        };
+        regions_cover(&format!("{drift_e} e- of drift over {rows} rows"), &parts, made);
     }
 }
 
@@ -153,7 +173,7 @@ fn what_taps_and_drift_leave_open_is_refused() {
         AddNoise::new(&scene.header, &NoiseSettings { cte: Some(0.9999), ..settings(1) }).unwrap_err().to_string();
     assert!(cte.contains("several `taps`"), "{cte}");
     let drift = drifting([26, 22], [900.0, 2500.0, 1800.0], 9.0);
-    let camera = demosaicked(&plane_of(&digitized(&noisy(&drift, &settings(1)))), Method::Bilinear);
+    let camera = demosaicked(&plane_of(&digitized(&noisy(&drift, &settings(1)))), Method::SmoothHue);
     assert!(why(&camera).contains("`black_drift_e`"), "{}", why(&camera));
     assert!(PixelNoise::of(&camera.header).is_ok());
     let full = drifting([26, 22], [29_990.0, 2500.0, 1800.0], 9.0);

@@ -6,7 +6,7 @@ use crate::propagation::budget::{Budget, Cause};
 use crate::propagation::frame::{FixedPart, Predicted, Sites};
 use crate::propagation::gains;
 use crate::propagation::tapped::TapMoments;
-use crate::propagation::{Equations, FramePrediction, PixelMoments, TappedPixels};
+use crate::propagation::{Equations, FramePrediction, PixelMoments, SiteCovariance, TappedPixels};
 use nalgebra::Matrix3;
 
 /// Variances of photosites by cause.
@@ -68,21 +68,23 @@ fn of_pixels(
     covariance: &Matrix3<f64>,
     fixed: &FixedPart,
 ) -> Vec<CauseVariance> {
-    let gains = gains::mean_pixel(&mixture.weights);
+    let (gains, sites) = (gains::mean_pixel(&mixture.weights), mixture.site_covariance());
     let mut found = each(|cause| {
         let of_classes = [0, 1, 2].map(|class| causes[class][cause as usize]);
         match cause.shared_by() {
             None => gains.covariance(of_classes).diagonal().into(),
             Some(axis) => {
                 let shared = Matrix3::from_fn(|k, l| (of_classes[k] * of_classes[l]).max(0.0).sqrt());
-                let none = Matrix3::zeros();
-                let lines = if axis == 0 { [&shared, &none] } else { [&none, &shared] };
-                gains.of_lines(lines).diagonal().into()
+                let mut alone = SiteCovariance::independent([0.0; 3]);
+                *(if axis == 0 { &mut alone.row } else { &mut alone.column }) = shared;
+                if cause == Cause::BlackDrift {
+                    (alone.drift, alone.drift_rows) = (shared, sites.drift_rows);
+                }
+                gains::mean_pixel_covariance(&mixture.weights, &alone).diagonal().into()
             }
         }
     });
-    let sites = mixture.site_covariance();
-    let first_order = gains.of(&sites);
+    let first_order = gains::mean_pixel_covariance(&mixture.weights, &sites);
     let has_lines = found.iter().any(|entry| entry.cause.shared_by().is_some() && entry.variance != [0.0; 3]);
     if has_lines || !sites.is_independent() {
         add_curved_lines(&mut found, curving(causes), &first_order, &fixed.first_order);

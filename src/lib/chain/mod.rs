@@ -5,6 +5,7 @@
 
 pub mod camera;
 mod causes;
+mod patches;
 pub mod predicted;
 pub mod predictor;
 

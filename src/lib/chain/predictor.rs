@@ -5,6 +5,7 @@
 
 use super::camera::CameraSetup;
 use super::causes::{Causes, fixed_of};
+use super::patches::PatchMeans;
 use super::predicted::{CauseVariance, ChainPrediction, ChainStage, NoiseDeltaE, PhaseCovariance, StagePrediction};
 use crate::camera::sensor::Sensor;
 use crate::cfa::Class;
@@ -15,7 +16,6 @@ use crate::metadata::{CorrectionRecord, FrameHeader, Scene};
 use crate::names::Named;
 use crate::numerics::normal::{self, MeanVariance};
 use crate::propagation::budget::{Budget, Cause};
-use crate::propagation::drift;
 use crate::propagation::frame::{Predicted, Sites, Unpredictable};
 use crate::propagation::gains;
 use crate::propagation::ground::{has_tails, quantity_of_sites};
@@ -185,7 +185,8 @@ impl Predictor {
         for (stage, head) in &self.heads {
             let none = |why| refused(*stage, electrons, why);
             let is_pixels = head.metadata.demosaic.is_some();
-            if is_pixels && head.readout().is_ok_and(|readout| readout.black_drift_e > 0.0) {
+            let do_rows_drift = || head.readout().is_ok_and(|readout| readout.black_drift_e > 0.0);
+            if is_pixels && self.settings.camera.method == Method::SmoothHue && do_rows_drift() {
                 no_pixels = Some(PIXELS_IN_DRIFT.to_owned());
                 continue;
             }
@@ -193,10 +194,10 @@ impl Predictor {
                 match self.settings.of_taps(head) {
                     Ok((prediction, causes)) => {
                         if let (FramePrediction::Tapped(pixels), ChainStage::Lab) = (&prediction, *stage) {
-                            noise_delta_e =
-                                Some(self.settings.delta_e(pixels.noise_length(), &prediction, &pixels.covariance));
+                            let patches = self.settings.patches(head, &prediction, &pixels.covariance).map_err(none)?;
+                            noise_delta_e = Some(self.settings.delta_e(pixels.noise_length(), &patches));
                         }
-                        stages.push(self.settings.stage(*stage, head, &prediction, &causes));
+                        stages.push(self.settings.stage(*stage, head, &prediction, &causes).map_err(none)?);
                     }
                     Err(why) if is_pixels => no_pixels = Some(why.to_string()),
                     Err(why) => return Err(none(why)),
@@ -225,7 +226,8 @@ impl Predictor {
                         }
                         Equations::Paper => normal::length(&Vector3::from(mixture.bias), &mixture.covariance),
                     };
-                    noise_delta_e = Some(self.settings.delta_e(length, &prediction, &mixture.covariance));
+                    let patches = self.settings.patches(head, &prediction, &mixture.covariance).map_err(none)?;
+                    noise_delta_e = Some(self.settings.delta_e(length, &patches));
                 }
                 FramePrediction::Pixels(mixture) if *stage == ChainStage::Demosaicked => {
                     let variances = mixture.sites.map(|site| site.moments.variance);
@@ -235,7 +237,7 @@ impl Predictor {
                 _ => {}
             }
             let of_stage = Causes::of(&sites, head, &prediction, causes).map_err(none)?;
-            stages.push(self.settings.stage(*stage, head, &prediction, &of_stage));
+            stages.push(self.settings.stage(*stage, head, &prediction, &of_stage).map_err(none)?);
             known = Some((plane, sites, causes));
         }
         Ok(ChainPrediction { electrons, stages, noise_delta_e, first_order, no_pixels })
@@ -248,8 +250,8 @@ fn refused(stage: ChainStage, electrons: [f64; 3], why: Unpredictable) -> Error 
 }
 
 /// Why no pixels are predicted of a black level that drifts.
-const PIXELS_IN_DRIFT: &str = "the black level of the sensor drifts along rows (`black_drift_e`), and what pixels share by that is not \
-                               predicted";
+const PIXELS_IN_DRIFT: &str = "the black level of the sensor drifts along rows (`black_drift_e`), and what pixels by shti share by that is \
+                               not predicted; pixels by other methods are (--method)";
 
 impl PredictorSettings {
     /// A frame that several amplifiers read, and the variances of its photosites by cause: of photosites means over all of a class, of
@@ -289,7 +291,7 @@ impl PredictorSettings {
         head: &FrameHeader,
         prediction: &FramePrediction,
         causes: &Causes,
-    ) -> StagePrediction {
+    ) -> Predicted<StagePrediction> {
         let metadata = &head.metadata;
         let (mean, covariance) = self.mean_and_covariance(prediction, metadata.quantity == QuantityKind::Lab);
         let second_order = match prediction {
@@ -310,9 +312,9 @@ impl PredictorSettings {
         let signal = mean.map(|mean| mean - black);
         let saturated = saturation::expected(head);
         let is_signal = metadata.quantity != QuantityKind::Lab;
-        let patch = self.patch.map(|size| self.patch_mean(prediction, &covariance, size));
+        let patches = self.patches(head, prediction, &covariance)?;
         let certain_enough = |wanted: f64, i: usize, side: usize| {
-            let variance = self.patch_mean(prediction, &covariance, [side; 2])[(i, i)];
+            let variance = patches.anywhere([side; 2])[(i, i)];
             variance.max(0.0).sqrt() <= wanted * signal[i]
         };
         let pixels_needed = match self.wanted {
@@ -322,7 +324,7 @@ impl PredictorSettings {
             })),
             _ => None,
         };
-        StagePrediction {
+        Ok(StagePrediction {
             stage,
             unit: metadata.unit.clone(),
             channels: match metadata.cfa {
@@ -348,10 +350,10 @@ impl PredictorSettings {
             second_order_covariance: second_order.filter(|_| self.equations == Equations::Exact),
             phases: self.phases(prediction),
             causes: by_cause,
-            patch_mean_std: patch.as_ref().map(diagonal_std),
-            patch_mean_covariance: patch.as_ref().map(rows),
+            patch_mean_std: patches.asked.as_ref().map(diagonal_std),
+            patch_mean_covariance: patches.asked.as_ref().map(rows),
             pixels_needed,
-        }
+        })
     }
 
     /// Mean and covariance of a pixel, by the exact equations to first order unless the stage is curved.
@@ -368,7 +370,7 @@ impl PredictorSettings {
                 (mixture.mean, mixture.covariance)
             }
             FramePrediction::Pixels(mixture) => {
-                let first_order = || gains::mean_pixel(&mixture.weights).of(&mixture.site_covariance());
+                let first_order = || gains::mean_pixel_covariance(&mixture.weights, &mixture.site_covariance());
                 (mixture.mean, if is_curved { mixture.covariance } else { first_order() })
             }
             FramePrediction::Tapped(pixels) => (pixels.mean, pixels.covariance),
@@ -394,44 +396,25 @@ impl PredictorSettings {
             column,
             row,
             class: mixture.weights.class(phase, [0, 0]).letter(),
-            covariance: rows(&gains::pixel(&mixture.weights, phase).of(&sites)),
+            covariance: rows(&gains::pixel_covariance(&mixture.weights, phase, &sites)),
         };
         PHASES.into_iter().enumerate().map(entry).collect()
     }
 
-    /// Covariance of the mean of a patch. Before demosaicking, and by the paper, its pixels count as independent.
-    fn patch_mean(&self, prediction: &FramePrediction, covariance: &Matrix3<f64>, size: [usize; 2]) -> Matrix3<f64> {
-        match prediction {
-            FramePrediction::Pixels(mixture) if self.equations == Equations::Exact => {
-                let phase = self.patch_at.map(|[x, y]| crate::stages::demosaic::stencil::phase(x, y));
-                mixture.patch_mean_covariance(phase, size)
-            }
-            FramePrediction::Planes(classes) => {
-                let sites = SiteCovariance::of(classes);
-                let [columns, rows] = size.map(|extent| extent as f64);
-                let own = sites.own_of_planes();
-                let of_rows = if sites.drifts() {
-                    let shared = drift::of_mean_of_rows(size[1], sites.drift_rows);
-                    (sites.row - sites.drift) / rows + sites.drift * shared
-                } else {
-                    sites.row / rows
-                };
-                own / (columns * rows) + of_rows + sites.column / columns
-            }
-            FramePrediction::Tapped(pixels) => {
-                let phase = self.patch_at.map(|[x, y]| crate::stages::demosaic::stencil::phase(x, y));
-                pixels.patch_mean(phase, size)
-            }
-            FramePrediction::Groups(sites) => sites.patch_mean(size),
-            FramePrediction::Pixels(_) => covariance / (size[0] as f64 * size[1] as f64),
-        }
+    fn patches<'a>(
+        &self,
+        head: &FrameHeader,
+        prediction: &'a FramePrediction,
+        covariance: &'a Matrix3<f64>,
+    ) -> Predicted<PatchMeans<'a>> {
+        PatchMeans::of(head, (prediction, covariance), self.equations, self.patch, self.patch_at)
     }
 
     /// The color difference that noise makes in L*a*b*, `found` of a pixel.
-    fn delta_e(&self, found: MeanVariance, prediction: &FramePrediction, covariance: &Matrix3<f64>) -> NoiseDeltaE {
+    fn delta_e(&self, found: MeanVariance, patches: &PatchMeans<'_>) -> NoiseDeltaE {
         // The mean of a patch is taken of XYZ, so that the curvature of L*a*b* does not bias it.
-        let of_patch =
-            |size: [usize; 2]| normal::length(&Vector3::zeros(), &self.patch_mean(prediction, covariance, size)).mean;
+        let length = |covariance: &Matrix3<f64>| normal::length(&Vector3::zeros(), covariance).mean;
+        let of_patch = |size: [usize; 2]| length(&patches.anywhere(size));
         let pixels_needed = match self.wanted {
             Some(Uncertainty::Jnd(wanted)) => smallest_square(|side| of_patch([side; 2]) <= wanted * DELTA_E_PER_JND),
             _ => None,
@@ -440,7 +423,7 @@ impl PredictorSettings {
             mean: found.mean,
             std: found.std(),
             jnd: found.mean / DELTA_E_PER_JND,
-            patch_mean: self.patch.map(of_patch),
+            patch_mean: patches.asked.as_ref().map(length),
             pixels_needed,
         }
     }

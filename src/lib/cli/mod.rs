@@ -29,6 +29,7 @@ pub use session::Session;
 
 use crate::error::{Error, Result};
 use crate::formats::atomic::remove_pending_now;
+use crate::formats::inventory::{self, Kind};
 use crate::formats::places::STDOUT_NAME;
 use crate::formats::{keys, pipe, register, standard};
 use crate::metadata::METADATA_TEMPLATE;
@@ -65,6 +66,9 @@ pub fn start<A: CommandFactory + FromArgMatches>(
         if asks_for(option, &command) {
             return ended(program, show(|| std::io::stdout().write_all(text.as_bytes())));
         }
+    }
+    if asks_for("list", &command) {
+        return ended(program, show(|| std::io::stdout().write_all(inventory::page(Kind::Sensors, &[]).as_bytes())));
     }
     let words = wildcards::expanded(std::env::args_os().skip(1), &command);
     let all = std::iter::once(program.into()).chain(words.iter().cloned());

@@ -13,6 +13,9 @@ use crate::stages::noise::{LineNoise, NoiseModel};
 /// Why nothing is predicted of samples that were divided by a flat field.
 const NARROW: &str = "what was divided by a flat field, or the flat field, reaches full well or an end of the codes, or \
                                  scatters over less than a code";
+/// The same of a converter that is not straight.
+const BENT: &str = "it was divided by a flat field, and the curve of its converter (`linearization`) is in both: what it makes of the quotient is not \
+                    predicted";
 
 /// Why nothing is said of samples that were divided by noise.
 pub(super) const NOISY: &str = "the flat field is so noisy that what is divided by it follows no series here (standard deviations beyond \
@@ -171,6 +174,9 @@ impl Photosite {
 
     /// Why [`Self::divided`] gives nothing of a class.
     pub(super) fn why_not_divided(&self, class: usize, expected_e: f64) -> Unpredictable {
+        if self.adc.is_some_and(|adc| adc.is_bent()) {
+            return Unpredictable::Beyond(BENT);
+        }
         let is_open =
             |(adc, flat): (AdcRecord, Flat)| self.is_all_open(&adc, &flat, [expected_e, flat.expected_e[class]]);
         Unpredictable::Beyond(if self.adc.zip(self.flat).is_some_and(is_open) { NOISY } else { NARROW })

@@ -270,12 +270,12 @@ impl Sites {
     fn straight(&self, frame: &FrameHeader) -> Predicted<PixelMoments> {
         let metadata = &frame.metadata;
         let record = metadata.demosaic.as_ref().ok_or(Unpredictable::Missing("demosaic"))?;
-        if self.photosite.drifts() {
-            return Err(Unpredictable::Beyond(DRIFTING));
-        }
         let equations = self.photosite.equations;
         let method = Method::named(&record.method)
             .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;
+        if self.photosite.drifts() && method == Method::SmoothHue {
+            return Err(Unpredictable::Beyond(DRIFTING));
+        }
         let black = subtracted(record.black, record.black_deltas)?;
         let size = [frame.geometry.width, frame.geometry.height];
         let mut camera = PixelMoments::demosaicked(record.cfa, black, method, self.moments, size, equations)
@@ -319,7 +319,7 @@ impl Sites {
     pub fn fixed(&self, frame: &FrameHeader, pixels: &PixelMoments, variances: [f64; 3]) -> Predicted<FixedPart> {
         let space = Curved::of(&frame.metadata)?.filter(|_| pixels.void.is_none());
         let means = self.means_over_exposures(variances, space.is_some())?;
-        let first_order = gains::mean_pixel(&pixels.weights).of(&SiteCovariance::of(&means.moments));
+        let first_order = gains::mean_pixel_covariance(&pixels.weights, &SiteCovariance::of(&means.moments));
         let covariance = match space {
             Some(space) => self.straight(frame)?.fixed_in(&means.straight(frame)?, |xyz| space.value(xyz)),
             None => first_order,

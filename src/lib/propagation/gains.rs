@@ -4,10 +4,12 @@
 //! class. So every covariance here is a sum over the classes of a gain times a variance.
 //!
 //! What photosites share by rows adds Σ_r Σ_kl A_rk A′_rl R_kl, A_rk the sum of the weights on the sites of class k in row r and R
-//! their covariance ([`SiteCovariance`]); so do columns.
+//! their covariance ([`SiteCovariance`]); so do columns. A drift of the black level is shared by rows that are near too: over its places
+//! ([`super::row_drift`]).
 
 use super::covariance::PAIRS;
 use super::moments::SiteCovariance;
+use super::row_drift::{LineWeights, RowDrift};
 use crate::cfa::Class;
 use crate::stages::demosaic::stencil::{PHASES, REACH, phase};
 use crate::stages::demosaic::weights::Weights;
@@ -26,17 +28,14 @@ pub struct Gains {
 /// photosites within rows, or within columns.
 pub type LineGains = [Matrix3<f64>; PAIRS.len()];
 
-/// What the sites of a row, or column, give to the three channels, by classes.
-type LineWeights = [[f64; 3]; 3];
-
 impl Gains {
     /// No gain.
     pub fn zero() -> Self {
         Self { own: [Matrix3::zeros(); 3], lines: [[Matrix3::zeros(); PAIRS.len()]; 2] }
     }
 
-    /// The covariance for photosites of such covariances.
-    pub fn of(&self, sites: &SiteCovariance) -> Matrix3<f64> {
+    /// The covariance for photosites of such covariances, but for what rows apart share.
+    fn of(&self, sites: &SiteCovariance) -> Matrix3<f64> {
         let own = self.covariance(sites.own);
         if sites.is_independent() { own } else { own + self.of_lines(sites.lines()) }
     }
@@ -83,6 +82,59 @@ impl Gains {
             lines: [0, 1].map(|axis| std::array::from_fn(|pair| mean(&|gains| gains.lines[axis][pair]))),
         }
     }
+}
+
+/// The covariance of a pixel of one phase, for photosites of such covariances.
+pub fn pixel_covariance(weights: &Weights, phase: usize, sites: &SiteCovariance) -> Matrix3<f64> {
+    lagged_covariance(weights, phase, [0, 0], sites)
+}
+
+/// The covariance of a pixel over all phases, that of the pixels of a large frame.
+pub fn mean_pixel_covariance(weights: &Weights, sites: &SiteCovariance) -> Matrix3<f64> {
+    mean_of_phases(|phase| pixel_covariance(weights, phase, sites))
+}
+
+/// The covariance of the channels of a pixel of one phase (rows) with those of the pixel `lag` (column, row) away (columns).
+pub fn lagged_covariance(weights: &Weights, phase: usize, lag: [isize; 2], sites: &SiteCovariance) -> Matrix3<f64> {
+    let covariance = autocovariance(weights, phase, lag).of(sites);
+    let Some(drift) = RowDrift::of(sites) else { return covariance };
+    let loads = |phase: usize, first: isize| -> Vec<(isize, Vector3<f64>)> {
+        let load = |row: isize| (first + row, drift.load(&line_weights(weights, phase, 0, row)));
+        (-REACH..=REACH).map(load).collect()
+    };
+    covariance + drift.apart(&loads(phase, 0), &loads(phase_at(PHASES[phase], lag), lag[1]))
+}
+
+/// The covariance of the means of a patch of `size` (columns, rows) well within a frame, whose corner is a pixel of `phase`, or of any.
+pub fn patch_covariance(
+    weights: &Weights,
+    phase: Option<usize>,
+    size: [usize; 2],
+    sites: &SiteCovariance,
+) -> Matrix3<f64> {
+    let of = |phase: usize| {
+        let covariance = patch_mean(weights, phase, size).of(sites);
+        let Some(drift) = RowDrift::of(sites) else { return covariance };
+        let rows =
+            distinct_sites(size[1]).into_iter().map(|(y, _)| (y, drift.load(&row_of_mean(weights, phase, size, y))));
+        covariance + drift.apart_in_patch(&rows.collect::<Vec<_>>(), size[1])
+    };
+    phase.map_or_else(|| mean_of_phases(of), of)
+}
+
+fn mean_of_phases(of: impl Fn(usize) -> Matrix3<f64>) -> Matrix3<f64> {
+    (0..PHASES.len()).map(of).sum::<Matrix3<f64>>() / PHASES.len() as f64
+}
+
+/// What the sites of a row from the corner of a patch give to its mean.
+fn row_of_mean(weights: &Weights, phase: usize, size: [usize; 2], y: isize) -> LineWeights {
+    let mut found = LineWeights::default();
+    for (x, times) in distinct_sites(size[0]) {
+        let class = weights.class(phase, [x, y]) as usize;
+        let mean = in_mean(weights, phase, size, [x, y]);
+        found[class].iter_mut().zip(mean).for_each(|(sum, mean)| *sum += times * mean);
+    }
+    found
 }
 
 /// Gains of the covariance of a pixel of one phase.
@@ -254,6 +306,34 @@ mod tests {
                 let size = [width.cast_unsigned(), height.cast_unsigned()];
                 let found = patch_mean(&weights, phase, size).covariance(variances);
                 assert!(close(&found, &(sum / (n * n)), 1e-13), "{method:?} {size:?}: {found} {sum}");
+            }
+        }
+    }
+
+    /// So it has of photosites whose rows drift, of knots nearer than a stencil reaches, and farther off than a patch.
+    #[test]
+    fn patches_that_drift_agree_with_the_sum_over_all_pairs_of_pixels() {
+        let drift = Matrix3::from_fn(|k, l| [0.9, 0.5, 1.3][k] * [0.9, 0.5, 1.3][l]);
+        for (rows_per_knot, method) in [(2.0, Method::Bilinear), (4.7, Method::Malvar), (90.0, Method::EffectiveColor)]
+        {
+            let sites = SiteCovariance {
+                row: drift + Matrix3::from_diagonal_element(0.3),
+                drift,
+                drift_rows: rows_per_knot,
+                ..SiteCovariance::independent([2.0, 3.0, 5.0])
+            };
+            let weights = weights(method);
+            for (phase, [width, height]) in [(0, [1, 1]), (1, [2, 3]), (2, [3, 8]), (3, [2, 9]), (0, [3, 16])] {
+                let places: Vec<[isize; 2]> = (0..height).flat_map(|y| (0..width).map(move |x| [x, y])).collect();
+                let n = places.len() as f64;
+                let pairs = places.iter().flat_map(|a| places.iter().map(move |b| (*a, *b)));
+                let of = |(a, b): ([isize; 2], [isize; 2])| {
+                    lagged_covariance(&weights, phase_at(PHASES[phase], a), [b[0] - a[0], b[1] - a[1]], &sites)
+                };
+                let sum: Matrix3<f64> = pairs.map(of).sum();
+                let size = [width, height].map(isize::cast_unsigned);
+                let found = patch_covariance(&weights, Some(phase), size, &sites);
+                assert!(close(&found, &(sum / (n * n)), 1e-12), "{method:?} {size:?}: {found} {}", sum / (n * n));
             }
         }
     }

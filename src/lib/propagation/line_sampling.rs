@@ -22,10 +22,10 @@ use nalgebra::{Matrix3, Vector3};
 const LINES: usize = 2 * REACH.unsigned_abs() + 1;
 
 /// What the sites of each line within reach of a pixel give to its channels, by classes.
-type Profile = [[[f64; 3]; 3]; LINES];
+pub(super) type Profile = [[[f64; 3]; 3]; LINES];
 
 /// What the pixels of a rectangle share by its rows, or by its columns.
-struct Shared {
+pub(super) struct Shared {
     covariance: Matrix3<f64>,
     /// Pixels of a line, by parity.
     counts: [f64; 2],
@@ -35,7 +35,7 @@ struct Shared {
 
 impl Shared {
     /// By rows where `axis` is 0, by columns where it is 1; lines have so many pixels along them.
-    fn of(weights: &Weights, covariance: &Matrix3<f64>, axis: usize, place: &Place, along: usize) -> Self {
+    pub fn of(weights: &Weights, covariance: &Matrix3<f64>, axis: usize, place: &Place, along: usize) -> Self {
         let across = 1 - axis;
         let profile = |t: usize, p: usize| {
             let mut at = place.corner;
@@ -60,8 +60,23 @@ impl Shared {
         }
     }
 
+    /// What the sites of each line within reach of a pixel give to its channels.
+    pub fn profile(&self, t: usize, p: usize) -> &Profile {
+        &self.profiles[t][p]
+    }
+
+    /// Pixels of a line, by parity.
+    pub fn counts(&self) -> [f64; 2] {
+        self.counts
+    }
+
+    /// Whether nothing is shared.
+    pub fn is_none(&self) -> bool {
+        self.covariance == Matrix3::zeros()
+    }
+
     /// The covariance of the channels of a pixel (rows) with those of another (columns), each by parity along and line.
-    fn covariance(&self, [p, t]: [usize; 2], [q, u]: [usize; 2]) -> Matrix3<f64> {
+    pub fn covariance(&self, [p, t]: [usize; 2], [q, u]: [usize; 2]) -> Matrix3<f64> {
         let (first, second) = (&self.profiles[t][p], &self.profiles[u][q]);
         let lag = u.cast_signed() - t.cast_signed();
         let mut found = Matrix3::zeros();
@@ -78,7 +93,7 @@ impl Shared {
     }
 
     /// Lines that share something with one.
-    fn near(&self, t: usize) -> std::ops::Range<usize> {
+    pub fn near(&self, t: usize) -> std::ops::Range<usize> {
         t.saturating_sub(LINES - 1)..(t + LINES).min(self.profiles.len())
     }
 
@@ -135,19 +150,19 @@ pub(super) struct Nonlocal {
     pub products: [[f64; 6]; 6],
     /// Of row sums, in both orders.
     pub row_products: [[f64; 6]; 6],
-    /// Σ λ, Σ λ² and Σ λ³ of what rows share, and columns, for each channel, as the mean leaves them.
-    pub powers: [[[f64; 3]; 3]; 2],
+    /// Σ λ, Σ λ² and Σ λ³ of what rows share, columns, and rows near each other, for each channel, as the mean leaves them.
+    pub powers: [[[f64; 3]; 3]; 3],
 }
 
 /// Sums of one axis over all its lines.
-struct AxisSums {
-    total: Matrix3<f64>,
+pub(super) struct AxisSums {
+    pub total: Matrix3<f64>,
     products: [[f64; 6]; 6],
     row_products: [[f64; 6]; 6],
     /// Σ over lines of parities q, q′ of what pixels of parities p, p′ share: `[p][p′][q][q′]`.
-    by_parity: [[[[Matrix3<f64>; 2]; 2]; 2]; 2],
+    pub by_parity: [[[[Matrix3<f64>; 2]; 2]; 2]; 2],
     /// Σ over lines of parity q of the row sums of pixels of parity p: `[p][q]`.
-    row_sums: [[Matrix3<f64>; 2]; 2],
+    pub row_sums: [[Matrix3<f64>; 2]; 2],
     powers: [Powers; 3],
 }
 
@@ -176,7 +191,7 @@ impl Powers {
 }
 
 impl AxisSums {
-    fn of(weights: &Weights, covariance: &Matrix3<f64>, axis: usize, place: &Place) -> Self {
+    pub fn of(weights: &Weights, covariance: &Matrix3<f64>, axis: usize, place: &Place) -> Self {
         let none = [[0.0; 6]; 6];
         let mut sums = Self {
             total: Matrix3::zeros(),
@@ -275,7 +290,7 @@ impl Nonlocal {
             total: rows.total + columns.total,
             products: sum_of(&rows.products, &columns.products),
             row_products: sum_of(&rows.row_products, &columns.row_products),
-            powers: [powers(&rows), powers(&columns)],
+            powers: [powers(&rows), powers(&columns), [[0.0; 3]; 3]],
         };
         for p in 0..2 {
             for q in 0..2 {
@@ -312,12 +327,12 @@ impl Nonlocal {
     }
 }
 
-fn sum_of(a: &[[f64; 6]; 6], b: &[[f64; 6]; 6]) -> [[f64; 6]; 6] {
+pub(super) fn sum_of(a: &[[f64; 6]; 6], b: &[[f64; 6]; 6]) -> [[f64; 6]; 6] {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][j] + b[i][j]))
 }
 
 /// What the products of the sum of two covariances have beyond those of each.
-fn add_both(table: &mut [[f64; 6]; 6], a: &Matrix3<f64>, b: &Matrix3<f64>) {
+pub(super) fn add_both(table: &mut [[f64; 6]; 6], a: &Matrix3<f64>, b: &Matrix3<f64>) {
     for (row, [i, j]) in table.iter_mut().zip(PAIRS) {
         for (entry, [k, l]) in row.iter_mut().zip(PAIRS) {
             *entry += a[(i, k)] * b[(j, l)] + b[(i, k)] * a[(j, l)] + a[(i, l)] * b[(j, k)] + b[(i, l)] * a[(j, k)];

@@ -71,9 +71,13 @@ const DRIFT_CUT: &str = "its black level drifts along rows, and full well, an en
 const DRIFT_BENT: &str =
     "its black level drifts along rows, and the curve of the converter (`linearization`) bends what rows share by that";
 
-/// Why nothing is said of pixels of a frame whose black level drifts.
-pub(super) const DRIFTING: &str = "its black level drifts along rows (`black_drift_e`), and what its pixels share by that is not \
-                                   predicted; photosites are, before demosaicking";
+/// Why nothing is said of pixels by smooth hue transition of a frame whose black level drifts.
+pub(super) const DRIFTING: &str = "its black level drifts along rows (`black_drift_e`), and what pixels by smooth hue transition (shti) share by \
+                                   that is not predicted; pixels by other methods are";
+
+/// Why pixels of frames that were divided by a flat field have no standard deviations where the black level drifts.
+pub(super) const DIVIDED_DRIFT: &str =
+    "its black level drifts along rows (`black_drift_e`), and it was divided by a flat field";
 
 /// Why the paper says nothing.
 const NOT_IN_THE_PAPER: &str = "the paper has no equations for noise of rows and columns, nor for fixed offsets";

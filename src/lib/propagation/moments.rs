@@ -178,6 +178,12 @@ impl SiteCovariance {
         self.row == Matrix3::zeros() && self.column == Matrix3::zeros()
     }
 
+    /// The same without the drift of the black level.
+    #[must_use]
+    pub fn without_drift(&self) -> Self {
+        Self { row: self.row - self.drift, drift: Matrix3::zeros(), ..*self }
+    }
+
     /// Whether rows share the drift of the black level.
     pub fn drifts(&self) -> bool {
         self.drift != Matrix3::zeros()

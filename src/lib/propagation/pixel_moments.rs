@@ -65,7 +65,7 @@ impl PixelMoments {
                         bias = second.bias;
                         second.covariance
                     }
-                    None => gains::mean_pixel(&weights).of(&SiteCovariance::of(&sites)),
+                    None => gains::mean_pixel_covariance(&weights, &SiteCovariance::of(&sites)),
                 }
             }
             Equations::Paper => paper::demosaicked(method, variances, mean, Some(size))?,
@@ -155,7 +155,7 @@ impl PixelMoments {
     pub fn phase_covariances(&self) -> [Matrix3<f64>; PHASES.len()] {
         let sites = self.site_covariance();
         let further = self.beyond_weights();
-        std::array::from_fn(|phase| gains::pixel(&self.weights, phase).of(&sites) + further)
+        std::array::from_fn(|phase| gains::pixel_covariance(&self.weights, phase, &sites) + further)
     }
 
     /// The covariance of the photosites.
@@ -166,7 +166,7 @@ impl PixelMoments {
     /// What is predicted of the covariance beyond the weights: the second order of smooth hue transition, or the paper's
     /// equations.
     pub fn beyond_weights(&self) -> Matrix3<f64> {
-        self.covariance - gains::mean_pixel(&self.weights).of(&self.site_covariance())
+        self.covariance - gains::mean_pixel_covariance(&self.weights, &self.site_covariance())
     }
 
     /// Distance of a pixel from what lies `offset` before the mean, the phases of the filter array in these shares.
@@ -183,13 +183,9 @@ impl PixelMoments {
         MeanVariance { mean, variance: (square - mean * mean).max(0.0) }
     }
 
-    /// Gains of the covariance of the mean of a patch, its corner on `phase`, or on any.
+    /// The covariance of the mean of a patch, its corner on `phase`, or on any.
     pub fn patch_mean_covariance(&self, phase: Option<usize>, size: [usize; 2]) -> Matrix3<f64> {
-        let gains = match phase {
-            Some(phase) => gains::patch_mean(&self.weights, phase, size),
-            None => gains::mean_patch_mean(&self.weights, size),
-        };
-        gains.of(&self.site_covariance())
+        gains::patch_covariance(&self.weights, phase, size, &self.site_covariance())
     }
 }
 

@@ -8,7 +8,7 @@ use super::charge;
 use super::covariance::Covariance;
 use super::ground::{corrected, quantity_of_sites};
 use super::level_variance::{HALF_A_CODE, LevelVariance};
-use super::lines::{DRIFTING, TAPPED_DRIFT};
+use super::lines::{DIVIDED_DRIFT, TAPPED_DRIFT};
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::pixel_gains::{PixelGains, phase_at};
@@ -172,7 +172,7 @@ impl PixelNoise {
         let light = metadata.correction.as_ref().and_then(|correction| correction.flat.as_ref()?.illumination.as_ref());
         is_followed.and_then(|()| photosite.check_flat_in(light)).map_err(|why| frame.refuse(why.to_string()))?;
         if photosite.drifts() && photosite.flat.is_some() {
-            return Err(frame.refuse(DRIFTING));
+            return Err(frame.refuse(DIVIDED_DRIFT));
         }
         let average = match &metadata.average {
             Some(record) => {

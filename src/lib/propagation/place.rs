@@ -18,11 +18,12 @@ pub struct Place {
 }
 
 impl Place {
-    /// A place of the same law near the corner of a small frame: only phases, size and edges within reach matter.
+    /// A place of the same law near the corner of a small frame: only phases, size and edges within reach matter; and rows on the sensor, where
+    /// these drift.
     #[must_use]
-    pub fn canonical(self) -> Self {
+    pub fn canonical(self, do_rows_drift: bool) -> Self {
         let mut place = self;
-        for axis in 0..2 {
+        for axis in 0..if do_rows_drift { 1 } else { 2 } {
             let before = place.corner[axis];
             let after = place.frame[axis] - place.size[axis] - before;
             // Far edges come as near as they can without being felt, on the same phase.

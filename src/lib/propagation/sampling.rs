@@ -16,14 +16,15 @@
 //! the same amount with every two columns, so large regions follow exactly from small ones.
 
 use super::covariance::PAIRS;
+use super::drift_sampling::DriftSums;
 use super::line_sampling::{Local, Nonlocal};
+use super::mixed_pixel::{Pixel, pixels_of};
 use super::moments::Prediction;
 use super::moments::{LineCovariance, SiteCovariance};
 pub use super::place::Place;
 use super::place::{add_products, steps};
-use crate::cfa::Class;
 use crate::numerics::normal::MeanVariance;
-use crate::stages::demosaic::stencil::{REACH, Stencil, phase};
+use crate::stages::demosaic::stencil::REACH;
 use crate::stages::demosaic::weights::Weights;
 use nalgebra::{Matrix3, SMatrix};
 
@@ -60,7 +61,7 @@ impl Sampling {
         Self { count, mean_covariance: covariance / count + common, covariance, spread, variance_thirds: None }
     }
 
-    /// Of a rectangle of demosaicked pixels with `weights` on photosites of such moments.
+    /// Of a rectangle of demosaicked pixels with `weights` on photosites of such moments; where rows drift, the place has them on the sensor.
     pub fn of(weights: &Weights, sites: &[Prediction; 3], place: &Place) -> Self {
         let count = place.size[0] as f64 * place.size[1] as f64;
         let reach = weights.reach();
@@ -77,7 +78,12 @@ impl Sampling {
             }
         }
         let covariance = SiteCovariance::of(sites);
-        let shared = (!covariance.is_independent()).then(|| Nonlocal::of(weights, &covariance, place));
+        let mut shared =
+            (!covariance.is_independent()).then(|| Nonlocal::of(weights, &covariance.without_drift(), place));
+        if let (Some(shared), Some(drift)) = (&mut shared, DriftSums::of(weights, &covariance, place)) {
+            sums.add_drift(&drift);
+            drift.add_to(shared);
+        }
         sums.sampling(count, shared.as_ref())
     }
 }
@@ -229,25 +235,26 @@ impl Sums {
         }
     }
 
+    fn add_drift(&mut self, drift: &DriftSums) {
+        self.variance += drift.variance;
+        let tables =
+            [(&mut self.products, &drift.with_own.of_pairs), (&mut self.row_products, &drift.with_own.of_rows)];
+        for (mine, theirs) in tables {
+            mine.iter_mut().flatten().zip(theirs.iter().flatten()).for_each(|(mine, theirs)| *mine += theirs);
+        }
+    }
+
     /// Goes through all pairs of pixels within reach of each other, of a place that stands for one of a size. What they share by
     /// rows and columns counts as far as it meets what is their own.
     fn of(weights: &Weights, sites: &[Prediction; 3], place: &Place, size: [usize; 2]) -> Self {
         let [width, height] = place.size;
         let covariance = SiteCovariance::of(sites);
         let variances = covariance.own;
-        let local = (!covariance.is_independent()).then(|| Local::of(weights, &covariance, place, size));
+        // What rows share by a drift hangs on where they are: it has sums of its own.
+        let local =
+            (!covariance.is_independent()).then(|| Local::of(weights, &covariance.without_drift(), place, size));
         let fourths = [0, 1, 2].map(|k| sites[k].fourth_of_own(variances[k]));
-        let on_sensor = |at: [usize; 2]| [0, 1].map(|i| i64::from(place.origin[i]) + at[i] as i64);
-        let mut pixels = Vec::with_capacity(width * height);
-        for row in 0..height {
-            for column in 0..width {
-                let at = [place.corner[0] + column, place.corner[1] + row];
-                let [x, y] = on_sensor(at);
-                let phase = phase(x, y);
-                let stencils = [0, 1, 2].map(|channel| weights.stencil(phase, channel).folded(at, place.frame));
-                pixels.push(Pixel::new(&stencils, |offset| weights.class(phase, offset)));
-            }
-        }
+        let pixels = pixels_of(weights, place);
         let mut sums = Self::zero();
         let mut of_pairs = [[0.0; 6]; 6];
         let far = 2 * weights.reach();
@@ -381,42 +388,6 @@ fn add_with(table: &mut [[f64; 6]; 6], own: &Matrix3<f64>, shared: Option<&Matri
     add_products(table, shared, -1.0);
 }
 
-/// One pixel: the sites it is made of, with the weights of the three channels, and the same by offset.
-struct Pixel {
-    sites: Vec<([isize; 2], Class, [f64; 3])>,
-    stencils: [Stencil; 3],
-}
-
-impl Pixel {
-    fn new(stencils: &[Stencil; 3], class: impl Fn([isize; 2]) -> Class) -> Self {
-        let all = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| [x, y]));
-        let sites = all
-            .map(|offset| (offset, class(offset), stencils.each_ref().map(|stencil| stencil.at(offset))))
-            .filter(|(_, _, weights)| *weights != [0.0; 3])
-            .collect();
-        Self { sites, stencils: stencils.clone() }
-    }
-
-    /// The covariance of this pixel's channels (rows) with those of the pixel `lag` away.
-    fn covariance(&self, other: &Self, lag: [isize; 2], variances: [f64; 3]) -> Matrix3<f64> {
-        let mut covariance = Matrix3::zeros();
-        for (offset, class, mine) in &self.sites {
-            let there = [offset[0] - lag[0], offset[1] - lag[1]];
-            if there[0].abs() > REACH || there[1].abs() > REACH {
-                continue;
-            }
-            let theirs = other.stencils.each_ref().map(|stencil| stencil.at(there));
-            let variance = variances[*class as usize];
-            for j in 0..3 {
-                for i in 0..3 {
-                    covariance[(i, j)] += variance * mine[i] * theirs[j];
-                }
-            }
-        }
-        covariance
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::place::FAR;
@@ -425,7 +396,9 @@ mod tests {
     use crate::frame::mirror;
     use crate::propagation::gains;
     use crate::stages::demosaic::Method;
+    use crate::stages::demosaic::stencil::phase;
     use crate::stages::demosaic::weights::WeightTable;
+    use crate::stages::noise::knots;
     use nalgebra::DMatrix;
 
     fn sites(variances: [f64; 3], excess_kurtosis: f64) -> [Prediction; 3] {
@@ -498,6 +471,29 @@ mod tests {
         sites
     }
 
+    /// Of each class so much more of the drift of its row, with so many rows from knot to knot.
+    fn drifting(mut sites: [Prediction; 3], rows_per_knot: f64) -> [Prediction; 3] {
+        let scales = [0.9, 0.7, 0.8];
+        for (k, site) in sites.iter_mut().enumerate() {
+            let LineCovariance { row, drift, drift_rows, .. } = &mut site.lines;
+            (*drift, *drift_rows) = ([0, 1, 2].map(|l| scales[k] * scales[l]), rows_per_knot);
+            row.iter_mut().zip(*drift).for_each(|(row, drift)| *row += drift);
+            site.moments.variance += drift[k];
+        }
+        sites
+    }
+
+    /// The covariance of two rows by a drift of variance 1.
+    fn of_rows([y, other]: [i64; 2], rows_per_knot: f64) -> f64 {
+        let ((j, [a, b]), (k, [c, d])) = (knots(y, rows_per_knot), knots(other, rows_per_knot));
+        match k - j {
+            0 => a * c + b * d,
+            1 => b * c,
+            -1 => a * d,
+            _ => 0.0,
+        }
+    }
+
     /// Everything from full matrices: W of all pixels and channels, Σ = W D Wᵀ, P, traces.
     #[test]
     #[allow(clippy::too_many_lines, reason = "one case after another, against one set of matrices")]
@@ -508,15 +504,17 @@ mod tests {
             ([26, 7], [1, 1], [25, 5]),
             ([6, 27], [1, 2], [4, 24]),
         ];
-        for ((method, (frame, corner, size)), is_shared) in Method::ALL
-            .into_iter()
-            .flat_map(|method| cases.map(|case| (method, case)))
-            .flat_map(|case| [(case, false), (case, true)])
+        for ((method, (frame, corner, size)), (is_shared, per_knot)) in
+            Method::ALL.into_iter().flat_map(|method| cases.map(|case| (method, case))).flat_map(|case| {
+                [(false, None), (true, None), (true, Some(2.0)), (false, Some(5.3)), (true, Some(70.0))]
+                    .map(|shared| (case, shared))
+            })
         {
             let weights = WeightTable::new(method, CfaPattern::Rggb).about([0.6, 1.8]);
             let plain = sites([1.5, 2.0, 0.7], 0.9);
             let sites = if is_shared { sharing(plain) } else { plain };
-            let place = Place { frame, origin: [0, 0], corner, size };
+            let sites = per_knot.map_or(sites, |rows| drifting(sites, rows));
+            let place = Place { frame, origin: [0, -6], corner, size };
             let found = Sampling::of(&weights, &sites, &place);
             let (n, all) = (size[0] * size[1], frame[0] * frame[1]);
             let at = |s: usize| [s % frame[0], s / frame[0]];
@@ -538,7 +536,10 @@ mod tests {
                 if s == t {
                     return site.moments.variance;
                 }
-                shared(y == other_y, site.lines.row) + shared(x == other_x, site.lines.column)
+                let drift = per_knot.map_or(0.0, |rows| of_rows([y, other_y].map(|y| y as i64 - 6), rows));
+                shared(y == other_y, site.lines.row)
+                    + shared(x == other_x, site.lines.column)
+                    + shared(y != other_y, site.lines.drift) * drift
             });
             let p = DMatrix::identity(n, n) - DMatrix::from_element(n, n, 1.0 / n as f64);
             let c: Vec<DMatrix<f64>> = (0..9).map(|ij| &rows[ij / 3] * &d * rows[ij % 3].transpose()).collect();
@@ -564,7 +565,10 @@ mod tests {
                     expected.spread[a][b] = (normal + fourth) / (free * free);
                 }
             }
-            assert!(close(&found, &expected, 1e-11), "{method:?} {place:?} {is_shared}\n{found:?}\n{expected:?}");
+            assert!(
+                close(&found, &expected, 1e-11),
+                "{method:?} {place:?} {is_shared} {per_knot:?}\n{found:?}\n{expected:?}"
+            );
             // Third cumulants take what is shared and what is not apart, and the latter for χ².
             for (i, third) in found.variance_thirds.into_iter().flatten().enumerate() {
                 let cube = &pc[4 * i] * &pc[4 * i];
@@ -595,7 +599,7 @@ mod tests {
         let sites = sites([1.0, 2.0, 3.0], 0.2);
         for corner in [[0, 0], [2, 3], [3, 4], [17, 40], [34, 51]] {
             let place = Place { frame: [41, 60], origin: [-3, 8], corner, size: [7, 9] };
-            let canonical = place.canonical();
+            let canonical = place.canonical(false);
             assert!(canonical.frame[0] <= 7 + 2 * FAR && canonical.frame[1] <= 9 + 2 * FAR);
             assert!(close(&Sampling::of(&weights, &sites, &place), &Sampling::of(&weights, &sites, &canonical), 1e-13));
         }

@@ -279,7 +279,7 @@ impl<'a> Shares<'a> {
         let count = self.pixels.array.axes.iter().map(|axis| axis.lines.len() as f64).product();
         let powers =
             |powers: &[Powers; 3], total: &Matrix3<f64>| [0, 1, 2].map(|i| powers[i].projected(total[(i, i)], count));
-        let powers = [powers(&of_row, &of_rows), powers(&of_column, &of_columns)];
+        let powers = [powers(&of_row, &of_rows), powers(&of_column, &of_columns), [[0.0; 3]; 3]];
         Nonlocal { total: of_rows + of_columns, products, row_products, powers }
     }
 }

@@ -5,7 +5,7 @@ use super::notes::{self, Note};
 use super::values;
 use crate::analysis::comparison::{Comparison, ComparisonSettings, Side};
 use crate::analysis::statistics::Region;
-use crate::color::{Space, White};
+use crate::color::{Space, White, chromaticity};
 use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::pipe;
@@ -134,6 +134,7 @@ impl ColorPair {
         notes.extend(white.filter(|_| is_of_frames).and_then(|white| doubt_of_white(white, is_relative)));
         notes.extend(comparison.frames().flat_map(notes::of_reader));
         notes.extend(doubt_of_places(&comparison));
+        notes.extend(doubt_of_lights(&comparison).filter(|_| white.is_none()));
         Ok((comparison, notes))
     }
 }
@@ -150,6 +151,24 @@ impl ColorPair {
         );
         Some(Note::Warning(text))
     }
+}
+
+/// A warning of images whose colors are not in one light: what is white in one has a color in the other.
+fn doubt_of_lights(comparison: &Comparison<FrameReader>) -> Option<Note> {
+    /// Chromaticities in texts of four digits.
+    const NEAR: f64 = 1e-4;
+    let heads = comparison.frames().map(RowSource::header);
+    let mut whites = heads.filter_map(|head| Some((head, head.metadata.color.as_ref()?.white?)));
+    let [(first, a), (second, b)] = [whites.next()?, whites.next()?];
+    let [[x, y], [other_x, other_y]] = [a, b].map(chromaticity);
+    let is_far = (x - other_x).abs().max((y - other_y).abs()) > NEAR;
+    (comparison.white().is_some() && is_far).then(|| {
+        Note::Warning(format!(
+            "{}: its white has x {other_x:.4}, y {other_y:.4}, that of {} x {x:.4}, y {y:.4}: differences of their lights count as \
+             differences of colors; `to-xyz --adapt-to` brings both to one light, and --white names what both are seen under",
+            second.name, first.name
+        ))
+    })
 }
 
 /// A warning of images that show other parts of the sensor, so that pixels are compared that saw other light.

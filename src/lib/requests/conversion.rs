@@ -4,9 +4,10 @@ use super::described::{SaidExposure, apply_black};
 use super::notes::Note;
 use super::options::{Output, WhiteChoice};
 use super::values::{self, LightColor};
-use crate::analysis::characterization::CameraMatrix;
+use crate::analysis::characterization::{CameraMatrix, RELATIVE_MATRIX_UNIT};
 use crate::cfa::FilterArray;
 use crate::color::adaptation::Adaptation;
+use crate::color::saturation::Saturation;
 use crate::color::temperature::Locus;
 use crate::color::{self, Space, White, rows_of};
 use crate::error::{Error, Result};
@@ -119,6 +120,13 @@ impl Conversion {
             }
         };
         notes.extend(self.doubts(&matrix, frame));
+        let matrix = match without_exposure(&matrix, frame) {
+            Some((relative, note)) => {
+                notes.push(note);
+                relative
+            }
+            None => matrix,
+        };
         let adapting = self.adapting(matrix.white_xy, &frame.name)?;
         let adaptation = adapting.map(|adapting| adapting.matrix()).transpose()?;
         let adapted = |rows| adaptation.map_or(rows, |by| rows_of(&(by * color::matrix(&rows))));
@@ -304,6 +312,32 @@ fn matrix_of_sensor(frame: &FrameHeader) -> Result<CameraMatrix> {
             Err(Error::Usage(problem).change(&["matrix"]))
         }
     }
+}
+
+/// A matrix for absolute XYZ as one for relative XYZ, where the exposure of a frame is not known, and its levels are: Y = 1 is the D65 by which
+/// the first class reaches its white level.
+fn without_exposure(matrix: &CameraMatrix, frame: &FrameHeader) -> Option<(CameraMatrix, Note)> {
+    if matrix.is_relative() || frame.metadata.exposure.is_some() {
+        return None;
+    }
+    let range = frame.metadata.white_level_adu?.range_above(frame.uniform_black_adu().ok()?);
+    let xyz_from_camera = color::matrix(&matrix.xyz_from_camera);
+    let saturation = Saturation::of(&xyz_from_camera, [range; 3], White::D65.xyz(1.0));
+    if !(range > 0.0 && range.is_finite() && saturation.luminance > 0.0) {
+        return None;
+    }
+    let relative = CameraMatrix {
+        unit: Some(RELATIVE_MATRIX_UNIT.into()),
+        xyz_from_camera: rows_of(&(xyz_from_camera * (range / saturation.luminance))),
+        range_adu: None,
+        ..matrix.clone()
+    };
+    let note = format!(
+        "{}: its exposure is not known: XYZ are relative, Y = 1 for the D65 that saturates the camera; --exposure S and --f-number N make \
+         them cd/m2",
+        frame.name
+    );
+    Some((relative, Note::Warning(note)))
 }
 
 /// The matrix that comes with a frame: that of its sensor, or, where there is none or no exposure to use it with, that of

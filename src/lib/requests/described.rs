@@ -107,7 +107,8 @@ impl Described {
     ///
     /// Those of [`FrameReader::open`] and [`Self::apply`].
     pub fn open(&self, options: &InputOptions) -> Result<FrameReader> {
-        let mut reader = FrameReader::open(&InputOptions { tells_top: true, ..options.clone() })?;
+        let wants_plane = self.cfa.or(self.pattern).is_some();
+        let mut reader = FrameReader::open(&InputOptions { tells_top: true, wants_plane, ..options.clone() })?;
         self.apply(reader.header_mut())?;
         Ok(reader)
     }
@@ -345,7 +346,8 @@ impl DescribedWithBlack {
     ///
     /// Those of [`FrameReader::open`] and [`Self::apply`].
     pub fn open(&self, options: &InputOptions) -> Result<FrameReader> {
-        let mut reader = FrameReader::open(&InputOptions { tells_top: true, ..options.clone() })?;
+        let wants_plane = self.described.cfa.or(self.described.pattern).is_some();
+        let mut reader = FrameReader::open(&InputOptions { tells_top: true, wants_plane, ..options.clone() })?;
         self.apply(reader.header_mut())?;
         Ok(reader)
     }

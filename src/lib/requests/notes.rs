@@ -77,7 +77,13 @@ pub fn of_statistics(report: &Report) -> Vec<Note> {
     let beyond = (beyond > 0)
         .then(|| counted(beyond, "pixels are beyond the model of a correction; they are left out of the statistics"));
     let other = report.regions.iter().find_map(unlike_prediction);
-    let marked = saturated.into_iter().chain(defective).chain(beyond).chain(other).map(Note::Warning);
+    let unpredicted = report
+        .unpredicted
+        .as_ref()
+        .filter(|_| report.regions.iter().any(|region| region.patch.is_some()))
+        .map(|why| format!("nothing is predicted of the patches: {why}"));
+    let marked =
+        saturated.into_iter().chain(defective).chain(beyond).chain(other).chain(unpredicted).map(Note::Warning);
     Note::not_finite(not_finite).into_iter().chain(marked).collect()
 }
 

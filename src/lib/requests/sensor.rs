@@ -13,6 +13,9 @@ pub struct SensorRequest {
     /// Sensor: a known name, or a file
     #[arg(long, value_name = "NAME|FILE", default_value = data::DEFAULT_SENSOR)]
     pub sensor: String,
+    /// List the sensors that are known by name, with what each has and lacks
+    #[arg(long)]
+    pub list: bool,
     /// Sensor whose read-out counts in place of the sensor's own
     #[arg(long, value_name = "NAME|FILE")]
     pub readout: Option<String>,
@@ -33,6 +36,7 @@ impl Default for SensorRequest {
     fn default() -> Self {
         Self {
             sensor: data::DEFAULT_SENSOR.into(),
+            list: false,
             readout: None,
             setting: None,
             counts: None,
@@ -48,7 +52,7 @@ impl SensorRequest {
     ///
     /// Those of [`data::load_changed_sensor`].
     pub fn load(&self) -> Result<(LoadedSensor, Vec<Note>)> {
-        let Self { sensor, readout, setting, counts, peak_quantum_efficiency } = self.clone();
+        let Self { sensor, readout, setting, counts, peak_quantum_efficiency, .. } = self.clone();
         let changes = SensorChanges { readout, setting, counts, peak_quantum_efficiency };
         let loaded = data::load_changed_sensor(&sensor, &changes)?;
         let remarks = loaded.remarks().iter().cloned().map(Note::Remark);

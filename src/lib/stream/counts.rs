@@ -167,7 +167,8 @@ impl Counts {
             (
                 self.propagation_void,
                 "pixels have standard deviations that do not hold: of a green too near its noise to divide by, which say only that they \
-                 are large, or of a median or clipped mean of codes that scatter over so few that it hangs on where in a code it lies",
+                 are large; of a median or clipped mean of codes that scatter over so few that it hangs on where in a code it lies; or none (NaN), \
+                 where sums over hot pixels or random telegraph signals would take too long",
             ),
         ]
         .into_iter()

@@ -128,13 +128,16 @@ impl Quad {
     /// Adds rows, the first of which is row `first` of the frame.
     fn add(&mut self, first: usize, band: &[f32], geometry: &Geometry) {
         for (y, row) in band.chunks_exact(geometry.row_samples()).enumerate() {
-            let pairs = row[..geometry.width].chunks(2);
+            // Sums run in lanes, which compilers make vectors of; even ones are of even columns.
+            let mut lanes = [0.0; 8];
+            let (eights, rest) = row[..geometry.width].as_chunks::<8>();
+            for samples in eights.iter().map(<[f32; 8]>::as_slice).chain([rest]) {
+                lanes.iter_mut().zip(samples).for_each(|(lane, sample)| *lane += f64::from(*sample));
+            }
             let of_row = &mut self.0[(first + y) % 2 * 2..][..2];
-            for pair in pairs {
-                for ((sum, count), sample) in of_row.iter_mut().zip(pair) {
-                    *sum += f64::from(*sample);
-                    *count += 1.0;
-                }
+            for (parity, (sum, count)) in of_row.iter_mut().enumerate() {
+                *sum += lanes.iter().skip(parity).step_by(2).sum::<f64>();
+                *count += (geometry.width + 1 - parity).div_euclid(2) as f64;
             }
         }
     }

@@ -141,6 +141,9 @@ impl Iterator for Places {
 const READ_BY_SEVERAL: &str = "its sensor is read through several amplifiers (`taps`); regions of a uniform scene are predicted, and \
                                patches not";
 
+/// Why nothing is said of patches whose signal hangs on what else is in the frame.
+const OTHER_LIGHT: &str = "the signal of each hangs on other light of the frame: by smear (`smear_line_s` of the sensor), or charge that was moved (--cte)";
+
 /// Reads a whole frame and works out the statistics of the interiors of its patches.
 ///
 /// Where the scene is uniform, or not rendered, predictions are those of the frame, or none.
@@ -178,7 +181,9 @@ pub fn measure(
                 .collect()
         }
         Err(why) => {
-            unpredicted = Some(why.to_string());
+            // Patches of a scene that is not uniform are predicted at their own means.
+            unpredicted = (frame.metadata.scene.is_some() && !is_rendered(&frame) || frame.taps().is_some())
+                .then(|| if frame.taps().is_some() { why.to_string() } else { OTHER_LIGHT.into() });
             let laws = Laws::of(&frame, &regions);
             let tallies = tallies.par_iter().zip(&regions);
             tallies

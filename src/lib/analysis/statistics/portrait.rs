@@ -10,6 +10,7 @@ use crate::propagation::taps::pooled;
 use crate::propagation::{FramePrediction, PixelMoments, Prediction, gains};
 use crate::stream::{Passing, RowSource};
 use crate::units::QuantityKind;
+use nalgebra::Matrix3;
 use std::collections::VecDeque;
 
 /// Lags of the autocorrelation, in pixels, or in periods of a filter array.
@@ -341,24 +342,26 @@ impl Foreseen {
     fn of_pixels(mixture: &PixelMoments, index: usize, patches: [[usize; 2]; 2]) -> Self {
         let PixelMoments { weights, sites, .. } = mixture;
         let site_covariance = mixture.site_covariance();
-        let of = |gains: gains::Gains| gains.of(&site_covariance)[(index, index)];
-        let whole = of(gains::mean_pixel(weights));
+        let of = |covariance: Matrix3<f64>| covariance[(index, index)];
+        let whole = of(gains::mean_pixel_covariance(weights, &site_covariance));
         let beyond = (mixture.covariance[(index, index)] - whole).max(0.0);
         let common = sites.map(|site| site.common);
         let common: f64 = (0..3).map(|class| mixture.from_camera[(index, class)].powi(2) * common[class]).sum();
         let correlation = |lag: [isize; 2]| {
-            let phases = [0, 1, 2, 3].map(|phase| of(gains::autocovariance(weights, phase, lag)));
+            let phases = [0, 1, 2, 3].map(|phase| of(gains::lagged_covariance(weights, phase, lag, &site_covariance)));
             phases.iter().sum::<f64>() / (4.0 * whole)
         };
         let lags = || (1..=LAGS).map(usize::cast_signed);
         Self {
             mean: mixture.mean[index],
-            stds: [0, 1, 2, 3].map(|phase| (of(gains::pixel(weights, phase)) + beyond).max(0.0).sqrt()).to_vec(),
+            stds: [0, 1, 2, 3]
+                .map(|phase| (of(gains::pixel_covariance(weights, phase, &site_covariance)) + beyond).max(0.0).sqrt())
+                .to_vec(),
             has_few_far: sites.iter().any(|site| stands_out(site, false)),
             is_clipped: false,
-            profile_std: Some(
-                patches.map(|patch| (of(gains::mean_patch_mean(weights, patch)) + common).max(0.0).sqrt()),
-            ),
+            profile_std: Some(patches.map(|patch| {
+                (of(gains::patch_covariance(weights, None, patch, &site_covariance)) + common).max(0.0).sqrt()
+            })),
             correlations: Some([
                 lags().map(|lag| correlation([lag, 0])).collect(),
                 lags().map(|lag| correlation([0, lag])).collect(),

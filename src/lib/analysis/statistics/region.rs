@@ -50,7 +50,7 @@ impl Region {
             corner: [self.x, self.y],
             size: [self.width, self.height],
         };
-        whole.canonical()
+        whole.canonical(frame.readout().is_ok_and(|readout| readout.black_drift_e > 0.0))
     }
 
     /// Checks that the region has pixels and lies within a frame.

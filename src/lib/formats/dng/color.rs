@@ -67,10 +67,6 @@ fn found(
             "it leads to the colors of a picture, not of the scene (ColorimetricReference {reference})"
         )));
     }
-    let planes = tags::CFA_PLANE_COLOR.unsigned(file, image.directory(), 16)?;
-    if planes.is_some_and(|planes| planes != [0, 1, 2]) {
-        return Ok(Err("its classes are others than R, G and B (CFAPlaneColor)".into()));
-    }
     let light = match light(file, image)? {
         Ok(light) => light,
         Err(why) => {
@@ -82,6 +78,14 @@ fn found(
         }
     };
     mapped(file, image, light, "the white of the exposure", OwnMatrix::Color, notes)
+}
+
+/// The places of R, G and B in what a file tells of its classes; none of other classes \[DNG2023, CFAPlaneColor].
+pub(super) fn plane_order(file: &mut TiffFile, image: &RawImage) -> Result<Option<[usize; 3]>> {
+    let planes = tags::CFA_PLANE_COLOR.unsigned(file, image.directory(), 16)?.unwrap_or_else(|| vec![0, 1, 2]);
+    let place = |class: u64| planes.iter().position(|plane| *plane == class);
+    let [r, g, b] = [0, 1, 2].map(place);
+    Ok((|| (planes.len() == 3).then_some([r?, g?, b?]))())
 }
 
 /// Whether there is a matrix for an illuminant.
@@ -161,6 +165,10 @@ fn mapped(
     which: OwnMatrix,
     notes: &mut Vec<String>,
 ) -> Result<std::result::Result<RelativeMatrix, String>> {
+    // All of them have the signals in the order of CFAPlaneColor.
+    let Some(order) = plane_order(file, image)? else {
+        return Ok(Err("its classes are others than R, G and B (CFAPlaneColor)".into()));
+    };
     let (calibration, first) = match calibration(file, image, notes)? {
         Ok(found) => found,
         Err(why) => return Ok(Err(why)),
@@ -180,7 +188,7 @@ fn mapped(
         OwnMatrix::Forward => calibration.mapped_forward(&observer, light),
     };
     Ok(mapped.map(|mapped| RelativeMatrix {
-        xyz_from_camera: color::rows_of(&mapped.xyz_from_camera),
+        xyz_from_camera: color::rows_of(&mapped.xyz_from_camera).map(|row| order.map(|place| row[place])),
         white_xy: mapped.white_xy,
         method: format!("{name} of the DNG, for {named}, {adapted}"),
     }))

@@ -61,15 +61,18 @@ pub(super) fn describe(
     Ok(metadata)
 }
 
-/// A doubt of the black level of an image without one, which then is 0 \[DNG2023, BlackLevel], where its masked photosites may read
-/// something else.
+/// A doubt of the black level of an image without one, which then is 0 \[DNG2023, BlackLevel], though what photosites read without light may
+/// be something else.
 pub(super) fn doubt_of_black(image: &RawImage, active: Rectangle) -> Option<&'static str> {
     let directory = image.directory();
     let is_masked = tags::MASKED_AREAS.is_in(directory) || active != Rectangle::whole(image.size);
-    (is_masked && !tags::BLACK_LEVEL.is_in(directory)).then_some(
+    let doubt = if is_masked {
         "it has masked photosites and no BlackLevel, which by DNG is then 0; what they read comes off with `import-raw --crop full` and \
-         `correct-frame --black border`, and a level that is known with `correct-frame --black N`",
-    )
+         `correct-frame --black border`, and a level that is known with `correct-frame --black N`"
+    } else {
+        "it has no BlackLevel, which by DNG is then 0; a level that is known comes off with `correct-frame --black N`"
+    };
+    (!tags::BLACK_LEVEL.is_in(directory)).then_some(doubt)
 }
 
 /// A doubt of levels that the first directory has instead of that of the raw image below it, where they belong \[DNG2023, ch. 4].
@@ -204,6 +207,19 @@ fn told_exposure(
         Ok(file.ratio(directory, tag.tag())?.filter(|number| *number > 0.0))
     };
     let (time, aperture) = (number(tags::EXPOSURE_TIME)?, number(tags::F_NUMBER)?);
+    // Logarithms, rounded, which some files have alone: Tv = −log₂ t, Av = 2 log₂ N [Exif, Annex C].
+    let mut of_logarithm = |known: Option<f64>, tag: tags::DngTag, factor: f64| -> Result<Option<f64>> {
+        let directory = directories.iter().find(|directory| known.is_none() && tag.is_in(directory));
+        let Some(directory) = directory else { return Ok(known) };
+        let number = file.ratio(directory, tag.tag())?.map(|logarithm| (factor * logarithm).exp2());
+        let number = number.filter(|number| *number > 0.0 && number.is_finite());
+        if number.is_some() {
+            notes.push(format!("its exposure is told by logarithms alone, which cameras round ({})", tag.1));
+        }
+        Ok(number)
+    };
+    let time = of_logarithm(time, tags::SHUTTER_SPEED_VALUE, -1.0)?;
+    let aperture = of_logarithm(aperture, tags::APERTURE_VALUE, 0.5)?;
     Ok(exposure_of(time, aperture, notes))
 }
 

@@ -38,7 +38,10 @@ pub(super) fn profile(file: &mut TiffFile, image: &RawImage, notes: &mut Vec<Str
         notes.push("its noise profile is passed over: it is no pairs of numbers from 0 to 1 (NoiseProfile)".into());
         return Ok(None);
     }
-    Ok(Some(NoiseProfile { lines: lines.to_vec() }))
+    // Its lines are in the order of CFAPlaneColor.
+    let order = super::color::plane_order(file, image)?.filter(|_| lines.len() == 3);
+    let lines = order.map_or_else(|| lines.to_vec(), |order| order.map(|place| lines[place]).to_vec());
+    Ok(Some(NoiseProfile { lines }))
 }
 
 /// The profile of a frame as its metadata keep it; none where its levels leave no range.
@@ -76,7 +79,9 @@ fn drawn(header: &FrameHeader, cfa: FilterArray, range: f64) -> Option<Vec<f64>>
     }
     let line = LinearNoise::of(&NoiseModel::of(header, record).ok()?, &adc);
     let planes = cfa.filters().len().max(1);
-    Some([line.slope_adu / range, line.offset_adu2 / (range * range)].repeat(planes))
+    let numbers = [line.slope_adu / range, line.offset_adu2 / (range * range)];
+    // What takes too long to work out is no number.
+    numbers.iter().all(|number| number.is_finite()).then(|| numbers.repeat(planes))
 }
 
 /// What the raw file told, of so many ADU from black to white; none once codes were made straight.

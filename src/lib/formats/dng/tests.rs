@@ -475,6 +475,48 @@ fn exposure_and_metadata_of_ours_are_found() {
     assert_eq!((reader.own_tags().exposure, reader.embedded()), (None, None));
 }
 
+/// 2⁻⁶ s at f/4.
+#[test]
+fn exposures_told_by_logarithms_alone_are_read() {
+    let image = Image::new(4, 2, 16).strips(&samples(8, 16, 1), 2, Image::plain);
+    let image = image.with(37377, SIGNED_RATIO, &[6.0, 1.0]).with(37378, RATIO, &[8.0, 2.0]);
+    let reader = open(&image.file(&[]), RawArea::Active).unwrap();
+    let exposure = reader.own_tags().exposure.unwrap();
+    assert_eq!((exposure.exposure_s, exposure.f_number), (1.0 / 64.0, 4.0));
+    assert_eq!(reader.notes().iter().filter(|note| note.contains("by logarithms alone")).count(), 2);
+    // The numbers themselves count before them.
+    let reader = open(&image.with(33434, RATIO, &[1.0, 60.0]).file(&[]), RawArea::Active).unwrap();
+    assert_eq!(reader.own_tags().exposure.unwrap().exposure_s, 1.0 / 60.0);
+}
+
+/// Blue, green and red are the same camera as red, green and blue.
+#[test]
+fn classes_in_another_order_have_the_same_matrix_and_noise() {
+    let tags = |order: [usize; 3]| {
+        let rows = [[0.9, 0.1, -0.1], [-0.3, 1.2, 0.2], [0.1, 0.1, 0.7]];
+        let ratios = |numbers: &[f64]| numbers.iter().flat_map(|number| [number * 1e4, 1e4]).collect::<Vec<_>>();
+        let neutral = [0.5, 1.0, 0.6];
+        let profile = [[1e-3, 1e-4], [2e-3, 2e-4], [3e-3, 3e-4]];
+        let image = Image::new(4, 2, 16)
+            .strips(&samples(8, 16, 1), 2, Image::plain)
+            .with(50710, BYTE, &order.map(|class| class as f64))
+            .with(50721, SIGNED_RATIO, &ratios(&order.map(|class| rows[class]).concat()))
+            .with(50728, RATIO, &ratios(&order.map(|class| neutral[class])))
+            .with(51041, RATIO, &ratios(&order.map(|class| profile[class]).concat()));
+        let reader = open(&image.file(&[]), RawArea::Active).unwrap();
+        let metadata = reader.own_tags().clone();
+        (metadata.relative_matrix.unwrap().xyz_from_camera, metadata.noise_profile.unwrap().lines)
+    };
+    let (matrix, lines) = tags([0, 1, 2]);
+    for order in [[2, 1, 0], [1, 2, 0]] {
+        let (other, of_other) = tags(order);
+        assert_eq!(of_other, lines);
+        // Inverses of matrices of permuted rows differ by rounding.
+        let off = matrix.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-12, "{order:?}: {other:?}, not {matrix:?}");
+    }
+}
+
 #[test]
 #[allow(clippy::too_many_lines, reason = "a table of cases")]
 fn what_cannot_be_read_is_refused_by_name() {

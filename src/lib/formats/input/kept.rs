@@ -29,11 +29,17 @@ impl Taken {
     ///
     /// [`Error::Usage`] where there is no such channel.
     pub(super) fn of(stored: &Geometry, options: &InputOptions, name: &str, metadata: &mut Metadata) -> Result<Self> {
-        let Some(channel) = &options.channel else {
+        let plane = || filtered_plane(stored).filter(|_| options.wants_plane);
+        let Some(channel) = options.channel.as_deref().or_else(plane) else {
             let geometry = keep_planes(stored, options.all_channels, metadata.quantity);
             return Ok(Self { place: 0, called: None, geometry });
         };
         let taken = Self::one(stored, channel, name, metadata.quantity)?;
+        if options.channel.is_none() {
+            register::doubt(format!(
+                "{name}: its channel `{channel}` is taken for the plane behind the filter array; --channel NAME takes another"
+            ));
+        }
         metadata.unit = unit_of(stored, taken.place, &metadata.unit);
         Ok(taken)
     }
@@ -56,6 +62,19 @@ impl Taken {
         };
         Ok(Self { place, called: Some(names[place].to_owned()), geometry: stored.with_channels(&["Y"]) })
     }
+}
+
+/// The one of several channels whose name, or the end of it, says that it is the plane behind a filter array.
+fn filtered_plane(stored: &Geometry) -> Option<&str> {
+    const NAMES: [&str; 7] = ["y", "raw", "cfa", "bayer", "mosaic", "gray", "grey"];
+    let is_plane = |channel: &&str| {
+        let last = channel.rsplit('.').next().unwrap_or(channel);
+        NAMES.iter().any(|name| last.eq_ignore_ascii_case(name))
+    };
+    let mut found = stored.channels.iter().map(String::as_str).filter(is_plane);
+    // A plane Y that leads, with layers behind it, is the frame whatever is wanted.
+    let leads = stored.channels.first().is_some_and(|first| first == "Y");
+    found.next().filter(|_| !leads && stored.channels.len() > 1 && found.next().is_none())
 }
 
 /// The unit of one channel, or of its standard deviation, of a frame whose channels may have one each.

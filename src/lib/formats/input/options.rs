@@ -34,6 +34,8 @@ pub struct InputOptions {
     pub camera: OfCamera,
     /// Whether samples that are heaped at the top are told, where nothing else tells that they are saturated.
     pub tells_top: bool,
+    /// Whether a plane behind a filter array is meant, which of several channels is found by its name where none is named.
+    pub wants_plane: bool,
 }
 
 /// What a user says of a camera.

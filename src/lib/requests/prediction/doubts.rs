@@ -16,35 +16,22 @@ pub(super) fn of_converter(readout: &ReadOut) -> Option<Note> {
     doubt_of_slope(&AdcRecord::of_readout(readout), readout.full_well_e)
 }
 
-/// A warning of a patch whose place has a noise of its own: it is predicted as anywhere in the middle of the sensor, by its place in the period of
-/// the filters, and by all amplifiers on average.
+/// Refuses a patch that is not on the sensor.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for a patch that is not on the sensor.
-pub(super) fn of_place(readout: &ReadOut, patch: Option<([usize; 2], [i64; 2])>, reach: usize) -> Result<Option<Note>> {
-    let Some((size, [x, y])) = patch else { return Ok(None) };
-    let sides = [(x, size[0], readout.width), (y, size[1], readout.height)];
-    let room = |(begin, extent, side): (i64, usize, u32)| {
-        begin.min(i64::from(side).saturating_sub(begin).saturating_sub_unsigned(extent as u64))
-    };
-    let room = sides.map(room).into_iter().min().unwrap_or(0);
-    if room < 0 {
-        let problem =
-            format!("the patch lies beyond the {}x{} photosites of the sensor", readout.width, readout.height);
-        return Err(Error::Usage(problem).change(&["patch_at"]));
+/// [`Error::Usage`] for it.
+pub(super) fn check_place(readout: &ReadOut, patch: Option<([usize; 2], [i64; 2])>) -> Result<()> {
+    let Some((size, corner)) = patch else { return Ok(()) };
+    let sides = [readout.width, readout.height];
+    let is_on =
+        |axis: usize| (0..=i64::from(sides[axis]).saturating_sub_unsigned(size[axis] as u64)).contains(&corner[axis]);
+    if is_on(0) && is_on(1) {
+        return Ok(());
     }
-    let why = if readout.taps.is_some() {
-        "which amplifiers read it is not asked, and its noise is that of all on average"
-    } else if room < reach as i64 {
-        "at the edge of the sensor samples are mirrored, but its noise is that in the middle, up to a tenth less"
-    } else {
-        return Ok(None);
-    };
-    let text = format!(
-        "of the place of the patch that in the period of the filters alone counts: {why}; `measure --region` of a frame predicts it there"
-    );
-    Ok(Some(Note::Warning(text)))
+    let [width, height] = sides;
+    Err(Error::Usage(format!("the patch lies beyond the {width}x{height} photosites of the sensor"))
+        .change(&["patch_at"]))
 }
 
 /// A warning of samples that the converter cuts off in a scene.

@@ -51,6 +51,8 @@ enum Beneath {
 pub struct Curve {
     flats: Vec<Point4>,
     darks: Vec<Point4>,
+    /// Exposure times of darks that the lines over time take.
+    dark_times: usize,
     beneath: Vec<Beneath>,
     /// Flats that the fits of gain and responsivity take.
     fitted: Vec<usize>,
@@ -113,6 +115,14 @@ pub struct Values {
     pub dark_variance_slope: Option<f64>,
 }
 
+/// How many exposure times the darks have that the lines over time take.
+fn times_of(darks: &[Point4]) -> usize {
+    let mut times: Vec<f64> = darks.iter().filter(|dark| dark.is_whole).filter_map(|dark| dark.exposure_s).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup_by(|a, b| (*a - *b).abs() <= SAME_TIME * b.abs());
+    times.len()
+}
+
 impl Curve {
     /// Of flats in the order of their light, and darks of one temperature, whose frames scatter so beyond noise. None where no gain
     /// follows.
@@ -123,10 +133,12 @@ impl Curve {
         let are_darks_clipped = darks.iter().any(|dark| is_clipped(dark, rounding));
         let is_silent = rounding > 0.0 && darks.iter().all(|dark| dark.variance < LEAST_VARIANCE);
         let hot = hot_share(darks);
+        let dark_points: Vec<Point4> = darks.iter().zip(are_whole(darks)).map(of_dark).collect();
         let mut curve = Self {
             beneath: Vec::new(),
             flats: flats.iter().map(point).collect(),
-            darks: darks.iter().zip(are_whole(darks)).map(of_dark).collect(),
+            dark_times: times_of(&dark_points),
+            darks: dark_points,
             fitted: Vec::new(),
             patterned: Vec::new(),
             saturated: peak(flats),
@@ -203,24 +215,22 @@ impl Curve {
 
     /// How many exposure times the darks have of which no more photosites are cut off than of all.
     pub fn times(&self) -> usize {
-        let mut times: Vec<f64> = self.whole_darks().filter_map(|dark| dark.exposure_s).collect();
-        times.sort_by(f64::total_cmp);
-        times.dedup_by(|a, b| (*a - *b).abs() <= SAME_TIME * b.abs());
-        times.len()
+        self.dark_times
     }
 
     /// Lines of mean and variance of the darks over time, where there are several times.
     fn dark_lines(&self) -> Option<[Line; 2]> {
-        let weights = &self.weights;
-        let points = |of: fn(&Point4) -> f64, weights: &[f64]| -> Vec<Point> {
+        if self.times() < 2 {
+            return None;
+        }
+        let line = |of: fn(&Point4) -> f64, weights: &[f64]| {
             let point = |(index, dark): (usize, &Point4)| {
                 Some(Point { x: dark.exposure_s?, y: of(dark), weight: weights.get(index).copied().unwrap_or(1.0) })
             };
-            self.darks.iter().enumerate().filter(|(_, dark)| dark.is_whole).filter_map(point).collect()
+            Line::through(self.darks.iter().enumerate().filter(|(_, dark)| dark.is_whole).filter_map(point))
         };
-        let mean = points(|dark| dark.mean_of_line().value, &weights.dark_mean);
-        let variance = points(|dark| dark.variance.value, &weights.dark_variance);
-        (self.times() >= 2).then(|| Some([Line::through(mean)?, Line::through(variance)?])).flatten()
+        let mean = line(|dark| dark.mean_of_line().value, &self.weights.dark_mean)?;
+        Some([mean, line(|dark| dark.variance.value, &self.weights.dark_variance)?])
     }
 
     /// Mean and variance of no light beneath a flat.
@@ -340,7 +350,7 @@ impl Curve {
         if self.are_darks_clipped {
             return self.flats[flat].mean.value;
         }
-        let lines = self.dark_lines().filter(|_| self.is_offset_free);
+        let lines = if self.is_offset_free { self.dark_lines() } else { None };
         lines.map_or_else(|| self.signal(flat), |[mean, _]| self.flats[flat].mean.value - mean.offset)
     }
 
@@ -353,11 +363,11 @@ impl Curve {
     }
 
     fn gain_line(&self) -> Option<Line> {
-        if self.is_offset_free {
-            Line::through(self.gain_points().collect::<Vec<_>>())
-        } else {
-            Line::through_zero(self.gain_points())
-        }
+        self.line_of_gain(self.gain_points().collect::<Vec<_>>())
+    }
+
+    fn line_of_gain(&self, points: impl IntoIterator<Item = Point> + Clone) -> Option<Line> {
+        if self.is_offset_free { Line::through(points) } else { Line::through_zero(points) }
     }
 
     /// What scatters beneath a flat: of the mean and of the variance of no light.
@@ -380,7 +390,8 @@ impl Curve {
     /// What the levels lead to.
     pub fn values(&self) -> Option<Values> {
         let line = self.gain_line()?;
-        let lines = self.dark_lines().filter(|_| self.times() >= 3);
+        let dark_lines = self.dark_lines();
+        let lines = dark_lines.filter(|_| self.times() >= 3);
         let shortest = || {
             let time = |dark: &&Point4| dark.exposure_s.unwrap_or(f64::INFINITY);
             self.darks.iter().min_by(|a, b| time(a).total_cmp(&time(b)))
@@ -395,7 +406,7 @@ impl Curve {
             gain: line.slope,
             dark_variance: dark_variance.filter(|_| has_darks),
             dark_mean: mean.filter(|_| has_darks),
-            black: self.dark_lines().map(|[mean, _]| mean.offset).filter(|_| has_darks),
+            black: dark_lines.map(|[mean, _]| mean.offset).filter(|_| has_darks),
             responsivity: self.response_line().map(|line| line.slope),
             dark_slope: lines.map(|[mean, _]| mean.slope).filter(|_| has_darks),
             dark_variance_slope: lines

@@ -35,21 +35,19 @@ impl Curve {
                         + line.slope.powi(2) * (point.mean.scatter() + beneath[0])
                 })
                 .collect();
-            let weighted = |besides: f64| {
-                let gain = own.iter().map(|own| 1.0 / (own + besides).max(f64::MIN_POSITIVE)).collect();
-                Self { weights: Weights { gain, ..self.weights.clone() }, ..self.clone() }
-            };
+            let points: Vec<Point> = self.gain_points().collect();
+            let weight = |own: &f64, besides: f64| 1.0 / (own + besides).max(f64::MIN_POSITIVE);
             let misfit = |besides: f64| {
-                let weighted = weighted(besides);
-                weighted.gain_line().map_or(0.0, |line| line.chi_square(weighted.gain_points()))
+                let weighed =
+                    points.iter().zip(&own).map(|(point, own)| Point { weight: weight(own, besides), ..*point });
+                self.line_of_gain(weighed.clone()).map_or(0.0, |line| line.chi_square(weighed))
             };
             let largest = self.fitted.iter().map(|&flat| self.noise(flat).powi(2)).fold(0.0, f64::max);
             besides = if freedom > 0.0 { variance_besides(freedom, misfit, largest) } else { 0.0 };
             let missed = misfit(0.0);
             let is_beyond = missed > freedom && significance::of_chi_square(missed, freedom) < BEYOND_FIVE;
-            let weights = weighted(besides).weights;
             self.gain_error = is_beyond.then(|| (besides / largest).sqrt());
-            self.weights = weights;
+            self.weights.gain = own.iter().map(|own| weight(own, besides)).collect();
         }
         for &flat in &self.fitted {
             self.flats[flat].variance.variance += besides;
