@@ -43,7 +43,7 @@ impl Kinds {
 }
 
 /// The mean of a sample about a center, and of its square.
-type Pair = [f64; 2];
+pub(super) type Pair = [f64; 2];
 
 /// Adds so much of a pair.
 fn add(sum: &mut Pair, times: f64, pair: Pair) {
@@ -120,6 +120,11 @@ impl LineMeans {
             add(&mut found, -0.5 * share, middle);
         }
         found
+    }
+
+    /// The same by places at even distances, of which many lie near each other.
+    pub fn near(&self, offset_e: f64) -> Pair {
+        if self.jumps.is_empty() && self.spacing_e.is_finite() { self.looked_up(offset_e) } else { self.at(offset_e) }
     }
 
     /// M at a place, by those at even distances around it.
