@@ -12,8 +12,8 @@ use cyanometer::cfa::CfaPattern;
 use cyanometer::color::{Space, White};
 use cyanometer::frame::{Geometry, to_sample};
 use cyanometer::masking::Corrections;
-use cyanometer::metadata::{AverageRecord, ExposuresRecord, FrameHeader, LeftOut, Metadata, Scene};
-use cyanometer::numerics::averages::{CLIP, Combine, average};
+use cyanometer::metadata::{FrameHeader, LeftOut, Metadata, Scene};
+use cyanometer::numerics::averages::Combine;
 use cyanometer::numerics::significance::of_smallest;
 use cyanometer::propagation::Equations;
 use cyanometer::propagation::pixels::PixelNoise;
@@ -31,6 +31,7 @@ use cyanometer::stream::{MemoryFrame, Stage};
 use cyanometer::units::QuantityKind;
 use rayon::prelude::*;
 use support::alarms::judge;
+use support::chain::averaged;
 use support::misses;
 use support::{sensor, through};
 
@@ -618,21 +619,6 @@ fn frames_of_one_mean_are_noticed() {
     let of_frames: Vec<f64> =
         tests.filter(|test| format!("{:?}", test.subject) == "VarianceOfFrameMeans").map(|test| test.p).collect();
     assert!(of_frames.len() == 3 && of_frames.iter().all(|p| *p < 1e-9), "{of_frames:?}");
-}
-
-/// The average of planes, and a record of it.
-fn averaged(planes: &[MemoryFrame], combine: Combine) -> MemoryFrame {
-    let mut made = planes[0].clone();
-    let mut across = vec![0.0; planes.len()];
-    for (index, sample) in made.samples.iter_mut().enumerate() {
-        across.iter_mut().zip(planes).for_each(|(across, plane)| *across = plane.samples[index]);
-        *sample = to_sample(average(combine, &mut across, CLIP).0);
-    }
-    let frames = u32::try_from(planes.len()).unwrap();
-    let clip = (combine == Combine::Clipped).then_some(CLIP);
-    let record = ExposuresRecord::of(AverageRecord { frames, combine, clip }, QuantityKind::Adu, false);
-    made.header.metadata.average = Some(record);
-    made
 }
 
 /// Medians of codes that scatter over less than one: mean and standard deviation by NumPy, each of 400,000 photosites of its own, and

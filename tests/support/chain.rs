@@ -5,7 +5,9 @@
 use super::{sensor, through};
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::color::{Space, White};
-use cyanometer::metadata::Scene;
+use cyanometer::frame::to_sample;
+use cyanometer::metadata::{AverageRecord, ExposuresRecord, Scene};
+use cyanometer::numerics::averages::{CLIP, Combine, average};
 use cyanometer::stages::adc::{AdcSettings, Digitize};
 use cyanometer::stages::black::Black;
 use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
@@ -15,6 +17,7 @@ use cyanometer::stages::mosaic::Mosaic;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::to_xyz::{ColorSettings, ToXyz};
 use cyanometer::stream::{MemoryFrame, Stage, run};
+use cyanometer::units::QuantityKind;
 
 pub fn with_readout(frame: &mut MemoryFrame, change: impl Fn(&mut ReadOut)) {
     let sensor = frame.header.metadata.sensor.as_mut().unwrap();
@@ -71,4 +74,19 @@ pub fn less_darks(plane: &MemoryFrame, light: &MemoryFrame, seed: u64, frames: u
     let mut corrected = MemoryFrame::new(stage.header().clone(), Vec::new());
     run(&stage, &mut LessDarks::new(&mut source, &mut darks), &mut corrected, &mut |_| ()).unwrap();
     MemoryFrame::new(corrected.header, corrected.samples)
+}
+
+/// The average of planes, and a record of it.
+pub fn averaged(planes: &[MemoryFrame], combine: Combine) -> MemoryFrame {
+    let mut made = planes[0].clone();
+    let mut across = vec![0.0; planes.len()];
+    for (index, sample) in made.samples.iter_mut().enumerate() {
+        across.iter_mut().zip(planes).for_each(|(across, plane)| *across = plane.samples[index]);
+        *sample = to_sample(average(combine, &mut across, CLIP).0);
+    }
+    let frames = u32::try_from(planes.len()).unwrap();
+    let clip = (combine == Combine::Clipped).then_some(CLIP);
+    let record = ExposuresRecord::of(AverageRecord { frames, combine, clip }, QuantityKind::Adu, false);
+    made.header.metadata.average = Some(record);
+    made
 }

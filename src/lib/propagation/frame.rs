@@ -109,14 +109,14 @@ pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePre
 }
 
 /// The same for how samples scatter: where photosites follow what their rows and columns share on a curve, by their places, as those of
-/// several amplifiers are told, which [`of_frame`] does not tell apart. So are pixels but for those by smooth hue transition.
+/// several amplifiers are told, which [`of_frame`] does not tell apart. So are pixels.
 ///
 /// # Errors
 ///
 /// As [`of_frame`].
 pub fn of_samples(frame: &FrameHeader, equations: Equations) -> Predicted<FramePrediction> {
     let found = of_frame(frame, equations)?;
-    if frame.metadata.average.is_some() || !found.has_lines() {
+    if !found.has_lines() {
         return Ok(found);
     }
     let sites = Sites::of(frame, equations)?;
@@ -125,9 +125,16 @@ pub fn of_samples(frame: &FrameHeader, equations: Equations) -> Predicted<FrameP
     }
     let by_places = match &found {
         FramePrediction::Planes(moments) => {
-            taps::one_group(frame, &sites.lit(), *moments)?.map(FramePrediction::Groups)
+            taps::one_group(frame, &sites.lit(), *moments, sites.average(frame)?.as_ref())?.map(FramePrediction::Groups)
         }
-        _ => tapped(frame, equations).ok().map(|pixels| FramePrediction::Tapped(Box::new(pixels))),
+        FramePrediction::Pixels(moments) => {
+            let method = frame.metadata.demosaic.as_ref().and_then(|record| Method::named(&record.method));
+            let is_by_hue = method == Some(Method::SmoothHue);
+            let pixels = pixels_by_place(frame, equations).ok();
+            let pixels = pixels.map(|pixels| if is_by_hue { pixels.with_moments(moments) } else { pixels });
+            pixels.map(|pixels| FramePrediction::Tapped(Box::new(pixels)))
+        }
+        FramePrediction::Groups(_) | FramePrediction::Tapped(_) => None,
     };
     Ok(by_places.unwrap_or(found))
 }
@@ -379,18 +386,25 @@ const BY_HUE_BY_TURNS: &str = "smooth hue transition divides by green, and sever
 
 /// Pixels of a frame that several amplifiers have a part in.
 fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> {
-    let metadata = &frame.metadata;
-    let record = metadata.demosaic.as_ref().ok_or(Unpredictable::Missing("demosaic"))?;
+    let record = frame.metadata.demosaic.as_ref().ok_or(Unpredictable::Missing("demosaic"))?;
     let beyond = |why: &'static str| Err(Unpredictable::Beyond(why));
     if equations == Equations::Paper {
         return beyond(OF_ONE);
     }
-    if metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
+    if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
         return beyond(taps::FLATTENED);
     }
     if Method::named(&record.method) == Some(Method::SmoothHue) {
         return beyond(if taps::are_by_turns(frame) { BY_HUE_BY_TURNS } else { BY_HUE });
     }
+    pixels_by_place(frame, equations)
+}
+
+/// Pixels of a frame by their places, of one amplifier or several; by smooth hue transition to first order, of one.
+fn pixels_by_place(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> {
+    let metadata = &frame.metadata;
+    let record = metadata.demosaic.as_ref().ok_or(Unpredictable::Missing("demosaic"))?;
+    let beyond = |why: &'static str| Err(Unpredictable::Beyond(why));
     let (mut groups, mut lit, mut average) = (Vec::new(), Vec::new(), None);
     for part in taps::parts(&taps::with_footprint(frame)) {
         let of_tap = FrameHeader { geometry: frame.geometry.clone(), ..part.frame };

@@ -16,7 +16,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 /// The standard deviation, in codes, of what blurs them from which rounding moves no mean by more than e^(−2π²σ²)/π, 10⁻⁹ of a code.
-const STRAIGHT: f64 = 1.0;
+pub(super) const STRAIGHT: f64 = 1.0;
 
 /// Distances in the width of what blurs the means: polynomials through [`POINTS`] places follow a normal blur to 7·10⁻⁶ of it.
 const DISTANCE: f64 = 1.0 / 3.0;
@@ -43,7 +43,7 @@ impl Kinds {
 }
 
 /// The mean of a sample about a center, and of its square.
-type Pair = [f64; 2];
+pub(super) type Pair = [f64; 2];
 
 /// Adds so much of a pair.
 fn add(sum: &mut Pair, times: f64, pair: Pair) {
@@ -120,6 +120,18 @@ impl LineMeans {
             add(&mut found, -0.5 * share, middle);
         }
         found
+    }
+
+    /// The same where they are smooth on another scale.
+    pub fn smooth_over(self, blur_e: f64) -> Self {
+        // Jumps are looked up too, as blurred as codes are.
+        let spacing_e = if self.jumps.is_empty() { DISTANCE * blur_e } else { self.spacing_e };
+        Self { spacing_e, ..self }
+    }
+
+    /// As [`Self::at`], by places at even distances, of which many lie near each other.
+    pub fn near(&self, offset_e: f64) -> Pair {
+        if self.jumps.is_empty() && self.spacing_e.is_finite() { self.looked_up(offset_e) } else { self.at(offset_e) }
     }
 
     /// M at a place, by those at even distances around it.

@@ -5,6 +5,7 @@
 //! less the charge, or each count of it, and the sum over v has panels between them. Of u it is smooth even then, as far as shot
 //! noise, or what is added, blurs it.
 
+use super::averaged_means::{AveragedMeans, Averaging};
 use super::bent_lines::{BentLine, Given};
 use super::blur::blur_e;
 use super::effort;
@@ -65,6 +66,23 @@ struct Class {
     adc: Option<AdcRecord>,
     /// The first class that is the same.
     same: usize,
+    /// How exposures were averaged; none of one.
+    averaging: Option<Averaging>,
+}
+
+/// Photosites of one class in one line.
+enum Means<'a> {
+    OfOne(LineMeans),
+    OfAverage(AveragedMeans<'a>),
+}
+
+impl Means<'_> {
+    fn at(&self, offset_e: f64) -> [f64; 2] {
+        match self {
+            Self::OfOne(means) => means.at(offset_e),
+            Self::OfAverage(means) => means.at(offset_e),
+        }
+    }
 }
 
 impl Photosite {
@@ -103,7 +121,7 @@ impl Photosite {
 ///
 /// [`Unpredictable::Beyond`] where they are too many.
 pub(super) fn curved(sites: &[Lit], axes: &[Axis]) -> Predicted<DMatrix<f64>> {
-    let shared = Shared::of(sites, axes);
+    let shared = Shared::of(sites, axes, None);
     let count = shared.classes.len();
     let (mut first, mut second) = (DVector::zeros(count), DMatrix::zeros(count, count));
     shared.each_value(sites, |weight, [means, _]| {
@@ -113,14 +131,15 @@ pub(super) fn curved(sites: &[Lit], axes: &[Axis]) -> Predicted<DMatrix<f64>> {
     Ok(second - &first * first.transpose())
 }
 
-/// How photosites of a line go together beyond their covariance; none where they share nothing.
+/// How photosites of a line go together beyond their covariance, in an average of so many exposures where it is one; none where they share
+/// nothing.
 ///
 /// # Errors
 ///
 /// As [`curved`].
-pub(super) fn bent(sites: &[Lit], axis: Axis) -> Predicted<Option<BentLine>> {
+pub(super) fn bent(sites: &[Lit], axis: Axis, frames: Option<u32>) -> Predicted<Option<BentLine>> {
     let mut given = Vec::new();
-    Shared::of(sites, &[axis]).each_value(sites, |weight, [means, squares]| {
+    Shared::of(sites, &[axis], frames).each_value(sites, |weight, [means, squares]| {
         given.push(Given { weight, variances: squares - means.component_mul(&means), means });
     })?;
     Ok(BentLine::of(given))
@@ -160,7 +179,7 @@ impl Shared {
         for (u, of_u) in gains {
             let share = 1.0 + self.response * u;
             let gained: Vec<Kinds> = self.classes.iter().map(|class| class.kinds.gained(share)).collect();
-            let line = self.line(&gained);
+            let line = self.line(&gained, share);
             let offsets = if is_sharp { &self.offsets(&gained)? } else { &smooth };
             all += offsets.len();
             if all > MOST_STEPPED {
@@ -178,12 +197,16 @@ impl Shared {
         Ok(())
     }
 
-    fn of(sites: &[Lit], axes: &[Axis]) -> Self {
+    /// Of such lines, in an average of so many exposures where it is one.
+    fn of(sites: &[Lit], axes: &[Axis], frames: Option<u32>) -> Self {
+        let of_mean = f64::from(frames.unwrap_or(1).max(1)).sqrt().recip();
+        let mut anew_e: f64 = 0.0;
         let mut shared = Self { offset_e: 0.0, response: 0.0, classes: Vec::new() };
         if let Some((site, _)) = sites.first() {
             for axis in axes {
                 let [temporal, fixed, of_response] = axis.parts(&site.model.lines);
-                shared.offset_e = shared.offset_e.hypot(temporal.hypot(fixed));
+                shared.offset_e = shared.offset_e.hypot((of_mean * temporal).hypot(fixed));
+                anew_e = anew_e.hypot(temporal);
                 shared.response = shared.response.hypot(of_response);
             }
         }
@@ -198,22 +221,27 @@ impl Shared {
                 let is_same =
                     |class: &Class| class.kinds == kinds && class.adc == adc && class.expected_e == expected_e;
                 let same = shared.classes.iter().position(is_same).unwrap_or(shared.classes.len());
-                shared.classes.push(Class { kinds, blur_e, expected_e, adc, same });
+                let averaging = frames.map(|frames| Averaging::of(site, expected_e, part, anew_e, frames));
+                shared.classes.push(Class { kinds, blur_e, expected_e, adc, same, averaging });
             }
         }
         shared
     }
 
     /// The photosites of a line, by class, each about the center that the law of most has; none where another is the same.
-    fn line(&self, gained: &[Kinds]) -> Vec<Option<LineMeans>> {
-        let of_class = |(k, class): (usize, &Class)| {
-            (class.same == k).then(|| LineMeans::of(&gained[k], class.kinds.most(), class.adc, class.blur_e))
+    fn line(&self, gained: &[Kinds], share: f64) -> Vec<Option<Means<'_>>> {
+        let means = |k: usize, class: &'_ Class| {
+            let about = self.classes[k].kinds.most();
+            match &self.classes[k].averaging {
+                None => Means::OfOne(LineMeans::of(&gained[k], about, class.adc, class.blur_e)),
+                Some(averaging) => Means::OfAverage(averaging.line(share, about, class.adc)),
+            }
         };
-        self.classes.iter().enumerate().map(of_class).collect()
+        self.classes.iter().enumerate().map(|(k, class)| (class.same == k).then(|| means(k, class))).collect()
     }
 
     /// Their mean samples, and those of the squares, where so much is added.
-    fn means(&self, line: &[Option<LineMeans>], offset_e: f64) -> [DVector<f64>; 2] {
+    fn means(&self, line: &[Option<Means<'_>>], offset_e: f64) -> [DVector<f64>; 2] {
         let mut found = [0, 1].map(|_| DVector::zeros(self.classes.len()));
         for (k, means) in line.iter().enumerate() {
             let same = self.classes[k].same;

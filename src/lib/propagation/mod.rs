@@ -6,6 +6,7 @@
 
 mod amplitudes;
 mod anew;
+mod averaged_means;
 mod bent;
 pub mod bent_lines;
 mod blur;

@@ -61,7 +61,7 @@ impl TapLines {
         }
         let [row, column] = whole;
         let together = |sites: &[Prediction; 3]| Matrix3::from_fn(|k, l| sites[k].lines.together[l]);
-        let bent = if average.is_none() { bent_lines(sites)? } else { [None, None] };
+        let bent = bent_lines(sites, average.map(|record| record.frames))?;
         Ok(Some(Self { row, column, together: moments.iter().map(together).collect(), bent }))
     }
 
@@ -113,8 +113,9 @@ impl Photosite {
     }
 }
 
-/// How photosites of lines go together beyond their covariances, where some of them follow what these have on a curve.
-fn bent_lines(sites: &[Lit]) -> Predicted<[Option<BentLine>; 2]> {
+/// How photosites of lines go together beyond their covariances, where some of them follow what these have on a curve, in an average of so many
+/// exposures where it is one.
+fn bent_lines(sites: &[Lit], frames: Option<u32>) -> Predicted<[Option<BentLine>; 2]> {
     let bends = sites.iter().map(|(photosite, expected_e)| photosite.bends_lines(*expected_e));
     if !bends.collect::<Predicted<Vec<bool>>>()?.contains(&true) {
         return Ok([None, None]);
@@ -122,8 +123,8 @@ fn bent_lines(sites: &[Lit]) -> Predicted<[Option<BentLine>; 2]> {
     // What comes off adds to what is shared alone.
     let codes: Vec<Lit> =
         sites.iter().map(|(photosite, expected_e)| (photosite.less_dark_frames(0), *expected_e)).collect();
-    let found = Axis::ALL.map(|axis| bent(&codes, axis));
-    if sites.iter().any(|(photosite, _)| photosite.darks[0].is_some()) {
+    let found = Axis::ALL.map(|axis| bent(&codes, axis, frames));
+    if frames.is_some() || sites.iter().any(|(photosite, _)| photosite.darks[0].is_some()) {
         // Of these less is known, and lines are taken to be straight.
         return Ok(found.map(|line| line.ok().flatten()));
     }

@@ -8,7 +8,9 @@
 use super::bent_lines::BentLine;
 use super::curved::{self, PixelLaw};
 use super::gains;
+use super::pixel_moments::PixelMoments;
 use super::sampling::Sampling;
+use super::smooth_hue::hues;
 use super::spaces::{Channels, Curved};
 use super::tap_lines::TapLines;
 use super::tapped_axis::Axis;
@@ -88,7 +90,7 @@ const SIDE: usize = 2 * REACH.unsigned_abs() + 1;
 
 impl Array {
     /// Of the photosites of a frame, `groups` of them with their amplifiers, and what these share.
-    fn of(frame: &FrameHeader, groups: &[(usize, Group)], lines: Option<&TapLines>) -> Predicted<Self> {
+    fn of(frame: &FrameHeader, groups: &[(usize, Group)], lines: Option<&TapLines>, hues: [f64; 2]) -> Predicted<Self> {
         let record = frame.metadata.demosaic.as_ref().ok_or(Unpredictable::Missing("demosaic"))?;
         let method = Method::named(&record.method)
             .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;
@@ -110,8 +112,7 @@ impl Array {
         let axes = axis(0).zip(axis(1)).ok_or(Unpredictable::Beyond(ELSEWHERE))?;
         let moments: Vec<_> = groups.iter().map(|(tap, group)| (*tap, group.sites)).collect();
         Ok(Self {
-            // No weight of the methods that are predicted hangs on hues.
-            weights: WeightTable::of(method, record.cfa).about([1.0; 2]),
+            weights: WeightTable::of(method, record.cfa).about(hues),
             taps,
             size: [readout.width, readout.height],
             moments: TapMoments::of(&moments, lines),
@@ -296,7 +297,9 @@ impl TappedPixels {
         groups: &[(usize, Group)],
         lines: Option<&TapLines>,
     ) -> Predicted<Self> {
-        let array = Array::of(frame, groups, lines)?;
+        let first = groups.first().map(|(_, group)| group.sites.map(|site| site.moments.mean - black));
+        // Weights hang on hues after smooth hue transition alone, of one amplifier.
+        let array = Array::of(frame, groups, lines, first.map_or([1.0; 2], hues))?;
         let [columns, rows] = array.axes.each_ref().map(|axis| &axis.examples);
         let count = array.axes.iter().map(|axis| axis.lines.len() as f64).product::<f64>();
         let mut kinds = Vec::with_capacity(columns.len() * rows.len());
@@ -318,6 +321,18 @@ impl TappedPixels {
         let groups = groups.iter().map(|(_, group)| *group).collect();
         let (space, sampling) = (channels.space, OnceLock::new());
         Ok(Self { mean, bias, covariance, groups, from_camera, space, array, kinds, sampling })
+    }
+
+    /// The same with mean and covariance of a large frame of one amplifier, of which these are the first order.
+    pub(super) fn with_moments(mut self, moments: &PixelMoments) -> Self {
+        let beyond = moments.beyond_weights();
+        let further = [0, 1, 2].map(|i| moments.mean[i] - self.mean[i]);
+        for kind in &mut self.kinds {
+            kind.mean.iter_mut().zip(further).for_each(|(mean, further)| *mean += further);
+            kind.covariance += beyond - kind.beyond;
+            kind.beyond = beyond;
+        }
+        Self { mean: moments.mean, bias: moments.bias, covariance: moments.covariance, ..self }
     }
 
     /// The kind of the pixel in a column and row of the plane.

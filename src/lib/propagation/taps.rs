@@ -370,8 +370,13 @@ pub(super) fn sites(
 /// # Errors
 ///
 /// [`Unpredictable::Beyond`] where no formula tells what they share.
-pub(super) fn one_group(frame: &FrameHeader, lit: &Lit, sites: [Prediction; 3]) -> Predicted<Option<TappedSites>> {
-    let lines = TapLines::of(std::slice::from_ref(lit), &[sites], None)?.filter(TapLines::are_bent);
+pub(super) fn one_group(
+    frame: &FrameHeader,
+    lit: &Lit,
+    sites: [Prediction; 3],
+    average: Option<&AverageRecord>,
+) -> Predicted<Option<TappedSites>> {
+    let lines = TapLines::of(std::slice::from_ref(lit), &[sites], average)?.filter(TapLines::are_bent);
     let (Some(lines), Some((_, cells))) = (lines, all_cells(frame)) else { return Ok(None) };
     let count = |class: Class| cells.all.iter().filter(|cell| cell.has(class)).map(|cell| cells.count(cell)).sum();
     let groups = vec![Group { counts: Class::ALL.map(count), sites }];

@@ -3,7 +3,7 @@
 use super::cells::{self, Seen};
 use super::check::{Expected, pair, rounding};
 use super::grids::{self, Array, Grid, PlaneScatter};
-use super::groups;
+use super::groups::{self, Part};
 use super::region::Region;
 use crate::cfa::Class;
 use crate::numerics::normal::MeanVariance;
@@ -194,7 +194,7 @@ impl Predicted {
         Self { tested: (count > 0).then_some(expected), ..one }
     }
 
-    /// Of a CFA plane that has so many samples of each class; nothing of none.
+    /// Of a CFA plane that has so many samples of each class, whose shares are not drawn; nothing of none.
     pub fn of_cfa_plane(classes: &[Prediction; 3], counts: [u64; 3], array: Option<&Array>) -> Self {
         let total = counts.iter().sum();
         let Some(prediction) = mixed(classes, counts) else { return Self::default() };
@@ -203,7 +203,13 @@ impl Predicted {
                 let expectation = Expectation::of_plane(&prediction, &array.of_plane(classes));
                 Self::of_one_that_is(expectation, &prediction, total)
             }
-            None => Self::of_one(&prediction, total),
+            None => {
+                let parts = classes.iter().zip(counts).filter(|(_, count)| *count > 0);
+                let parts: Vec<Part> = parts.map(|(class, count)| (count as f64, [*class; 3])).collect();
+                let expected = Expectation::of_sampling(&prediction, &groups::sampling(&parts));
+                let mean_error = expected.mean_error.hypot(prediction.common.max(0.0).sqrt());
+                Self::of_one_that_is(Expectation { mean_error, ..expected }, &prediction, total)
+            }
         }
     }
 

@@ -1,7 +1,8 @@
 //! What the head of a frame says of its samples, worked out once for all frames that have the same.
 
 use super::region::Region;
-use crate::metadata::FrameHeader;
+use crate::metadata::{AverageRecord, ExposuresRecord, FrameHeader};
+use crate::numerics::averages::Combine;
 use crate::propagation::sampling::{Place, Sampling};
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments, Unpredictable};
 use nalgebra::Matrix3;
@@ -22,6 +23,18 @@ pub(super) struct Known {
 }
 
 impl Known {
+    /// The same where something is predicted.
+    ///
+    /// # Errors
+    ///
+    /// Why nothing is.
+    pub fn checked(&mut self) -> Result<&mut Self, Unpredictable> {
+        match &self.prediction {
+            Ok(_) => Ok(self),
+            Err(why) => Err(why.clone()),
+        }
+    }
+
     /// Whether regions of a frame differ by their places, beyond what their size tells: several amplifiers have read it, or full well or an
     /// end of the codes cuts off what rows and columns share.
     pub fn are_by_place(&self, frame: &FrameHeader) -> bool {
@@ -43,7 +56,7 @@ impl Known {
 }
 
 /// What is predicted of the samples of a region of a frame; pixels that do not say where they were mirrored were so at its edges.
-fn of_samples(frame: &FrameHeader, region: Region, equations: Equations) -> Result<FramePrediction, Unpredictable> {
+pub(super) fn of_samples(frame: &FrameHeader, region: Region, equations: Equations) -> Result<FramePrediction, Unpredictable> {
     let mut header = region.header(frame);
     if let Some(record) = header.metadata.demosaic.as_mut().filter(|_| frame.taps().is_none()) {
         record.plane.get_or_insert(frame.geometry.on_sensor());
@@ -59,11 +72,33 @@ impl Laws {
         self.0.insert(known.unwrap_or_else(|| {
             let prediction = propagation::of_frame(frame, equations);
             let has_lines = prediction.as_ref().is_ok_and(FramePrediction::has_lines);
-            let is_by_place = |found| matches!(found, FramePrediction::Groups(_) | FramePrediction::Tapped(_));
-            let is_bent = has_lines && of_samples(frame, Region::whole(frame), equations).is_ok_and(is_by_place);
+            let of_whole = || of_samples(frame, Region::whole(frame), equations);
+            let is_bent = has_lines && of_whole().is_ok_and(|found| is_by_place(&found));
             Known { prediction, samplings: Samplings::default(), is_bent, regions: Vec::new(), head, equations }
         }))
     }
+}
+
+/// What is predicted of the mean over so many such frames in a region, where its rows or columns scatter unlike: by their places.
+pub(super) fn of_mean(
+    frame: &FrameHeader,
+    region: Region,
+    equations: Equations,
+    frames: u32,
+) -> Option<FramePrediction> {
+    let mut averaged = frame.clone();
+    let metadata = &mut averaged.metadata;
+    if metadata.average.is_some() {
+        return None;
+    }
+    let average = AverageRecord { frames, combine: Combine::Mean, clip: None };
+    metadata.average = Some(ExposuresRecord::of(average, metadata.quantity, metadata.demosaic.is_some()));
+    of_samples(&averaged, region, equations).ok().filter(is_by_place)
+}
+
+/// Whether photosites are told by their places.
+fn is_by_place(found: &FramePrediction) -> bool {
+    matches!(found, FramePrediction::Groups(_) | FramePrediction::Tapped(_))
 }
 
 /// Sampling laws by place: regions of one size and phase share one.

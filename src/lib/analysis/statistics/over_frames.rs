@@ -11,7 +11,7 @@
 //! S as in the sample variance of a frame; what is predicted beside them is what is expected of that region.
 
 use super::assessment::Assessment;
-use super::laws::Samplings;
+use super::laws::{self, Samplings};
 use super::levels::Levels;
 use super::measure::{check_testable, unfair};
 use super::region::Region;
@@ -245,7 +245,10 @@ impl Seen {
             let assess = |tally, prediction: Option<&FramePrediction>, samplings: &mut Samplings| {
                 Assessment::new(tally, frame, *region, prediction, |mixture| samplings.of(mixture, frame, *region))
             };
-            let of_means = assess(&means[index], known.map(|known| &known.means), of_means);
+            // Lines that full well or an end of the codes cuts off scatter unlike.
+            let bent = known.filter(|known| known.means.has_lines());
+            let bent = bent.and_then(|_| laws::of_mean(frame, *region, settings.equations, count));
+            let of_means = assess(&means[index], bent.as_ref().or(known.map(|known| &known.means)), of_means);
             let of_variances = assess(&temporal, known.map(|known| &known.variances), of_variances);
             let of_variances = of_variances.repeated(f64::from(count) - 1.0);
             let is_tested = settings.level.is_some() && known.is_some_and(|known| known.scatter.is_ok());

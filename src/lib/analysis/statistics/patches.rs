@@ -4,7 +4,7 @@
 //! them, and spread and covariance are predicted at these. The means are used up by that, and are not tested.
 
 use super::assessment::Assessment;
-use super::laws::Samplings;
+use super::laws::{self, Known};
 use super::levels::Levels;
 use super::region::Region;
 use super::report::{RegionReport, Report, coverage};
@@ -165,20 +165,15 @@ pub fn measure(
     let tallies = tallies(&mut watch, &regions, &levels)?;
     let (counts, left_out) = watch.seen();
     let mut unpredicted = None;
+    let mut of_frame = laws::Laws::default();
     let known = match frame.taps() {
-        None => propagation::of_frame(&frame, equations),
+        None => of_frame.of(&frame, equations).checked(),
         Some(_) => Err(Unpredictable::Beyond(READ_BY_SEVERAL)),
     };
     let reports: Vec<RegionReport> = match known {
         Ok(known) => {
-            let mut samplings = Samplings::default();
             let tallies = tallies.iter().zip(regions);
-            tallies
-                .map(|(tally, region)| {
-                    let sampling = |mixture: &PixelMoments| samplings.of(mixture, &frame, region);
-                    Assessment::new(tally, &frame, region, Some(&known), sampling).report(&frame, region, &levels)
-                })
-                .collect()
+            tallies.map(|(tally, region)| as_uniform(known, tally, &frame, region).report(&frame, region, &levels)).collect()
         }
         Err(why) => {
             // Patches of a scene that is not uniform are predicted at their own means.
@@ -188,7 +183,7 @@ pub fn measure(
             let tallies = tallies.par_iter().zip(&regions);
             tallies
                 .map(|(tally, region)| {
-                    let prediction = at_means(tally, &frame, equations);
+                    let prediction = at_means(tally, &frame, *region, equations);
                     let sampling = |mixture: &PixelMoments| laws.sampling(mixture, region.place(&frame));
                     let assessment = Assessment::new(tally, &frame, *region, prediction.as_ref(), sampling);
                     let mut report = assessment.report(&frame, *region, &levels);
@@ -249,16 +244,80 @@ fn is_rendered(frame: &FrameHeader) -> bool {
     frame.metadata.scene.is_some() && !frame.metadata.is_transferred() && !has_smear
 }
 
-/// What is predicted of a uniform scene whose means are those of a tally.
-fn at_means(tally: &Tally, frame: &FrameHeader, equations: Equations) -> Option<FramePrediction> {
+/// A patch of a uniform scene.
+fn as_uniform<'a>(known: &mut Known, tally: &'a Tally, frame: &FrameHeader, region: Region) -> Assessment<'a> {
+    let of_region = known.are_by_place(frame).then(|| known.of_region(frame, region));
+    let Known { prediction, samplings, .. } = known;
+    let prediction = of_region.as_deref().unwrap_or(prediction);
+    let sampling = |mixture: &PixelMoments| samplings.of(mixture, frame, region);
+    Assessment::new(tally, frame, region, prediction.as_ref().ok(), sampling)
+}
+
+/// What is predicted of a uniform scene whose means are those of a tally; where full well or an end of the codes cuts off what rows or columns
+/// share, with how it scatters in its region.
+fn at_means(tally: &Tally, frame: &FrameHeader, region: Region, equations: Equations) -> Option<FramePrediction> {
     if !is_rendered(frame) || frame.taps().is_some() {
         return None;
     }
-    let expected = expected_electrons(frame, means(tally)?)?;
-    let mut uniform = frame.clone();
-    let scene = frame.metadata.scene.clone()?;
-    uniform.metadata.scene = Some(Scene { uniform: true, expected_electrons: Some(expected), ..scene });
-    propagation::of_frame(&uniform, equations).ok()
+    let measured = expected_electrons(frame, means(tally)?)?;
+    let (uniform, found) = at_level(measured, frame, equations)?;
+    if !found.has_lines() {
+        return Some(found);
+    }
+    match laws::of_samples(&uniform, region, equations) {
+        Ok(by_place @ (FramePrediction::Groups(_) | FramePrediction::Tapped(_))) => Some(by_place),
+        _ => Some(found),
+    }
+}
+
+/// The uniform scene whose predicted means lead back to such electrons, and what is predicted of it: where full well or an end of the codes holds
+/// means back it is brighter, or darker, than these; none where no level is known to lead there.
+fn at_level(
+    measured: [f64; 3],
+    frame: &FrameHeader,
+    equations: Equations,
+) -> Option<(FrameHeader, FramePrediction)> {
+    /// Distances below this share of shot noise, or of an electron, do not count.
+    const NEAR: f64 = 0.02;
+    const STEPS: usize = 12;
+    /// Where a mean follows its level by less, noise of the mean is most of what is told of the level.
+    const LEAST_SLOPE: f64 = 0.3;
+    let scene = frame.metadata.scene.as_ref()?;
+    let at = |level: [f64; 3]| {
+        let mut uniform = frame.clone();
+        uniform.metadata.scene = Some(Scene { uniform: true, expected_electrons: Some(level), ..scene.clone() });
+        let found = propagation::of_frame(&uniform, equations).ok()?;
+        let means = match &found {
+            FramePrediction::Planes(sites) => sites.map(|site| site.moments.mean),
+            FramePrediction::Pixels(pixels) => pixels.mean,
+            FramePrediction::Groups(_) | FramePrediction::Tapped(_) => return None,
+        };
+        Some((uniform, found, means))
+    };
+    let mut level = measured;
+    let mut before: Option<([f64; 3], [f64; 3])> = None;
+    for _ in 0..STEPS {
+        let (uniform, found, means) = at(level)?;
+        let reached = electrons_of(frame, means)?;
+        let off = [0, 1, 2].map(|k| measured[k] - reached[k]);
+        let is_near = |k: usize| off[k].abs() <= NEAR * level[k].max(1.0).sqrt() || level[k] <= 0.0 && off[k] <= 0.0;
+        if (0..3).all(is_near) {
+            return Some((uniform, found));
+        }
+        let slope = |k: usize| match before {
+            Some((of_level, of_mean)) if (level[k] - of_level[k]).abs() > 1e-6 => {
+                (reached[k] - of_mean[k]) / (level[k] - of_level[k])
+            }
+            _ => 1.0,
+        };
+        let slopes = [0, 1, 2].map(slope);
+        if slopes.iter().any(|slope| !(LEAST_SLOPE..).contains(slope)) {
+            return None;
+        }
+        before = Some((level, reached));
+        level = [0, 1, 2].map(|k| if is_near(k) { level[k] } else { (level[k] + off[k] / slopes[k]).max(0.0) });
+    }
+    None
 }
 
 /// Means of the three planes, or of the classes of one; NaN for a class of which there is none.
@@ -275,9 +334,14 @@ fn means(tally: &Tally) -> Option<[f64; 3]> {
 /// Expected signal electrons of R, G and B in a patch whose samples have these means; 0 for a class of which the means
 /// do not tell, or tell less than nothing. None where the metadata do not say enough.
 ///
-/// Noise moves the means of L\*a\*b\* and xyY to second order, σ²/μ², and full well and the largest code hold them back:
-/// the first is far below the sampling error of a spread, the second leaves no level to work back to.
+/// Noise moves the means of L\*a\*b\* and xyY to second order, σ²/μ², far below the sampling error of a spread; full well and the ends of the
+/// codes hold them back, which [`measure`] takes into account where they leave a level to work back to.
 pub fn expected_electrons(frame: &FrameHeader, means: [f64; 3]) -> Option<[f64; 3]> {
+    electrons_of(frame, means).map(|electrons| electrons.map(|e| if e.is_finite() { e.max(0.0) } else { 0.0 }))
+}
+
+/// The same as the means are, below 0 and NaN too.
+fn electrons_of(frame: &FrameHeader, means: [f64; 3]) -> Option<[f64; 3]> {
     let metadata = &frame.metadata;
     let straight = metadata.adc.filter(|adc| !adc.is_bent());
     let camera_signals = |xyz: [f64; 3]| -> Option<[f64; 3]> {
@@ -286,7 +350,7 @@ pub fn expected_electrons(frame: &FrameHeader, means: [f64; 3]) -> Option<[f64; 
         Some((adu_from_xyz * Vector3::from(xyz) / straight?.adu_per_e).into())
     };
     let [first, second, third] = means;
-    let electrons = match metadata.quantity {
+    Some(match metadata.quantity {
         QuantityKind::ExpectedElectrons => means,
         QuantityKind::Electrons => means.map(|mean| mean - metadata.dark_signal_e.unwrap_or(0.0)),
         QuantityKind::Adu => {
@@ -298,8 +362,7 @@ pub fn expected_electrons(frame: &FrameHeader, means: [f64; 3]) -> Option<[f64; 
         QuantityKind::Xyy => camera_signals(color::xyz_of_chromaticity([first, second], third))?,
         QuantityKind::Lab => camera_signals(color::xyz_from_lab(means, metadata.color.as_ref()?.white?))?,
         _ => return None,
-    };
-    Some(electrons.map(|e| if e.is_finite() { e.max(0.0) } else { 0.0 }))
+    })
 }
 
 #[cfg(test)]
