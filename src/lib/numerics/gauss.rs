@@ -84,15 +84,35 @@ pub fn panel(low: f64, high: f64) -> impl Iterator<Item = (f64, f64)> {
 /// assert!((sum / (2f64.powi(16) / 16.0) - 1.0).abs() < 1e-12);
 /// ```
 pub fn few(low: f64, high: f64) -> impl Iterator<Item = (f64, f64)> {
-    // Legendre's: k/√(4k² − 1) beside a diagonal of 0.
-    static FEW: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
-        by_recurrence(&DMatrix::from_fn(8, 8, |i, j| {
-            let k = i.max(j) as f64;
-            if i.abs_diff(j) == 1 { k / (4.0 * k * k - 1.0).sqrt() } else { 0.0 }
-        }))
-    });
+    static FEW: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| legendre(8));
+    between(&FEW, low, high)
+}
+
+/// The same of a rule of 5 nodes, exact for polynomials of degree 9.
+///
+/// # Examples
+///
+/// ```
+/// let sum: f64 = cyanometer::numerics::gauss::fewest(0.0, 2.0).map(|(x, weight)| weight * x.powi(9)).sum();
+/// assert!((sum / (2f64.powi(10) / 10.0) - 1.0).abs() < 1e-12);
+/// ```
+pub fn fewest(low: f64, high: f64) -> impl Iterator<Item = (f64, f64)> {
+    static FEWEST: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| legendre(5));
+    between(&FEWEST, low, high)
+}
+
+/// Gauss and Legendre's nodes and weights, which add up to 1: k/√(4k² − 1) beside a diagonal of 0.
+fn legendre(nodes: usize) -> Vec<(f64, f64)> {
+    by_recurrence(&DMatrix::from_fn(nodes, nodes, |i, j| {
+        let k = i.max(j) as f64;
+        if i.abs_diff(j) == 1 { k / (4.0 * k * k - 1.0).sqrt() } else { 0.0 }
+    }))
+}
+
+/// Such nodes and weights from `low` to `high`.
+fn between(rule: &'static [(f64, f64)], low: f64, high: f64) -> impl Iterator<Item = (f64, f64)> {
     let (middle, half) = (f64::midpoint(low, high), 0.5 * (high - low));
-    FEW.iter().map(move |(x, weight)| (middle + half * x, 2.0 * half * weight))
+    rule.iter().map(move |(x, weight)| (middle + half * x, 2.0 * half * weight))
 }
 
 /// Gauss and Hermite's nodes and weights for a standard normal variable: eigenvalues of the matrix of the polynomials' recurrence, with

@@ -92,12 +92,17 @@ fn add_step(moments: &mut [f64; 4], code: f64, share: f64) {
 /// Moments 1 to 4, about a whole number from which the mean is off by `x`, of a rounded normal variable that no end is near; of a standard
 /// deviation of no less than [`FEW_TERMS`].
 fn free_moments(x: f64, sigma: f64) -> [f64; 4] {
-    let smooth = about(x, sigma * sigma + 1.0 / 12.0, -1.0 / 120.0);
+    let smooth = uniform(x, sigma);
     if sigma >= SMOOTH {
         return smooth;
     }
     let waves = moments_of_rounding(x, sigma);
     [0, 1, 2, 3].map(|j| smooth[j] + waves[j])
+}
+
+/// Moments 1 to 4 of a normal variable and a uniform error of one code.
+fn uniform(x: f64, sigma: f64) -> [f64; 4] {
+    about(x, sigma * sigma + 1.0 / 12.0, -1.0 / 120.0)
 }
 
 /// Powers 1 to 4.
@@ -153,6 +158,17 @@ impl Rounding {
         } else {
             self.sum(mean, sigma, center)
         }
+    }
+
+    /// What the ends take from these moments, of a variable that scatters over so many codes that rounding is a uniform error of it:
+    /// the moments less those of codes without ends. Nothing where no end is within [`REACH`].
+    pub fn taken_by_ends(&self, mean: f64, sigma: f64, center: f64) -> [f64; 4] {
+        let reach = REACH * sigma;
+        if mean - reach > self.lowest && mean + reach < self.highest {
+            return [0.0; 4];
+        }
+        let (ended, endless) = (self.moments(mean, sigma, center), uniform(mean - center, sigma));
+        [0, 1, 2, 3].map(|j| ended[j] - endless[j])
     }
 
     /// The first of [`Self::moments`], in less time.
@@ -264,9 +280,13 @@ impl Rounding {
         };
         let [at_low, at_high] = [whole(low.at), whole(high.at)];
         let of_first = powers(low.at - center);
+        let terms = terms(sigma);
         let [of_low, of_high] = [low, high].map(|end| {
-            let derivatives = end.derivatives(sigma);
-            [0, 1, 2, 3].map(|j| correction(j, end.at - center, &derivatives))
+            if end.is_far() {
+                return far_correction(end.at - center).map(|of_all| of_all * end.above);
+            }
+            let derivatives = end.derivatives(sigma, terms);
+            [0, 1, 2, 3].map(|j| correction(j, end.at - center, &derivatives, terms))
         });
         let moment = |j: usize| {
             let ends = at_high[j] * high.above + at_low[j] * low.below - at_low[j];
@@ -279,10 +299,16 @@ impl Rounding {
     fn mean_of_integral(&self, mean: f64, sigma: f64, center: f64) -> f64 {
         let ends = self.ends(mean, sigma);
         // ∫ T dt = (t − mean) T − σ φ.
+        let terms = terms(sigma);
         let [low, high] = ends.map(|end| {
-            let derivatives = end.derivatives(sigma);
-            let terms = MIDPOINTS.iter().enumerate().map(|(k, factor)| factor * derivatives[2 * k + 1]);
-            (end.at - mean) * end.above - sigma * end.density + terms.sum::<f64>()
+            let whole = (end.at - mean) * end.above - sigma * end.density;
+            if end.is_far() {
+                return whole;
+            }
+            let derivatives = end.derivatives(sigma, terms);
+            let corrections =
+                MIDPOINTS.iter().enumerate().take(terms).map(|(k, factor)| factor * derivatives[2 * k + 1]);
+            whole + corrections.sum::<f64>()
         });
         ends[0].at - center + high - low
     }
@@ -314,14 +340,19 @@ impl End {
         Self { at, z, density: density(z), below, above }
     }
 
-    /// Derivatives of T by t: −(−1)ⁿ⁻¹ Heₙ₋₁(z) φ(z)/σⁿ.
-    fn derivatives(&self, sigma: f64) -> [f64; DERIVATIVES] {
+    /// Whether it is so far off that nothing of the density is left there.
+    fn is_far(&self) -> bool {
+        self.z.abs() >= REACH
+    }
+
+    /// Derivatives of T by t, as many as such a number of corrections takes: −(−1)ⁿ⁻¹ Heₙ₋₁(z) φ(z)/σⁿ.
+    fn derivatives(&self, sigma: f64, terms: usize) -> [f64; DERIVATIVES] {
         let mut t = [0.0; DERIVATIVES];
         t[0] = self.above;
         let (mut before, mut hermite) = (0.0, 1.0);
         let step = -1.0 / sigma;
         let mut scale = self.density * step;
-        for (n, derivative) in t.iter_mut().enumerate().skip(1) {
+        for (n, derivative) in t.iter_mut().enumerate().take(2 * terms).skip(1) {
             *derivative = scale * hermite;
             scale *= step;
             (before, hermite) = (hermite, self.z * hermite - (n - 1) as f64 * before);
@@ -363,8 +394,20 @@ const MIDPOINTS: [f64; 6] = [
 /// Derivatives of T that these take.
 const DERIVATIVES: usize = 2 * MIDPOINTS.len();
 
+/// How many of these count: the next is below 10⁻¹³ σʲ⁺¹ at any distance.
+fn terms(sigma: f64) -> usize {
+    const FROM: [(f64, usize); 4] = [(55.0, 2), (17.0, 3), (8.5, 4), (5.5, 5)];
+    FROM.iter().find(|(from, _)| sigma >= *from).map_or(MIDPOINTS.len(), |(_, terms)| *terms)
+}
+
+/// The same at an end where T is 1 and its derivatives are nothing.
+fn far_correction(x: f64) -> [f64; 4] {
+    let [first, third, ..] = MIDPOINTS;
+    [0.0, 2.0 * first, 6.0 * x * first, (12.0 * x * x + 1.0) * first + 24.0 * third]
+}
+
 /// Σ of the odd derivatives of D T at one end, `x` from the center, by those of T.
-fn correction(j: usize, x: f64, t: &[f64; DERIVATIVES]) -> f64 {
+fn correction(j: usize, x: f64, t: &[f64; DERIVATIVES], terms: usize) -> f64 {
     // Derivatives 0 to 3 of D, a polynomial of degree j.
     let d = match j {
         0 => [1.0, 0.0, 0.0, 0.0],
@@ -381,7 +424,7 @@ fn correction(j: usize, x: f64, t: &[f64; DERIVATIVES]) -> f64 {
         }
         sum
     };
-    MIDPOINTS.iter().enumerate().map(|(k, factor)| factor * product(2 * k + 1)).sum()
+    MIDPOINTS.iter().enumerate().take(terms).map(|(k, factor)| factor * product(2 * k + 1)).sum()
 }
 
 #[cfg(test)]
@@ -403,6 +446,25 @@ mod tests {
             code += 1.0;
         }
         moments
+    }
+
+    /// What the ends take is nothing far from them, and near them what is left of the moments of codes without ends.
+    #[test]
+    fn ends_take_what_codes_without_ends_have_more() {
+        let [byte, endless] =
+            [(0.0, 255.0), (f64::NEG_INFINITY, f64::INFINITY)].map(|(lowest, highest)| Rounding { lowest, highest });
+        assert_eq!(byte.taken_by_ends(128.3, 12.0, 120.0), [0.0; 4]);
+        for (mean, sigma) in [(3.2, 1.3), (-4.0, 2.0), (9.7, 6.0), (250.1, 3.1), (100.0, 40.0)] {
+            let (taken, of_byte) = (byte.taken_by_ends(mean, sigma, 100.0), byte.moments(mean, sigma, 100.0));
+            let without = endless.moments(mean, sigma, 100.0);
+            for j in 0..4 {
+                let all = of_byte[j].abs() + without[j].abs();
+                assert!(
+                    (taken[j] - (of_byte[j] - without[j])).abs() <= 1e-13 * all && taken[j] != 0.0,
+                    "{mean} {sigma} {j}"
+                );
+            }
+        }
     }
 
     /// Rails near and far, spreads of a hundredth of a code to three times the range.

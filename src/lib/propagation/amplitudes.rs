@@ -1,6 +1,7 @@
 //! Amplitudes of hot photosites and of jumps, exponential numbers: the places and weights that sums over them take.
 
-use crate::numerics::gauss::{NODES, few, laguerre, panel};
+use crate::metadata::AdcRecord;
+use crate::numerics::gauss::{NODES, few, fewest, laguerre, panel};
 use std::sync::LazyLock;
 
 /// Excesses beyond which nothing counts, in units of their mean: e⁻⁴⁰ is 4·10⁻¹⁸.
@@ -110,9 +111,45 @@ pub(super) fn telling(share: f64) -> f64 {
     (0_u32..).map(f64::from).take_while(|r| *r < REACH).find(|r| is_beyond(*r)).unwrap_or(REACH)
 }
 
-/// Places and weights of an exponential number of mean 1 for a function that bends at `knees`, and is rounded; none of too many. Where
-/// not `is_fine` sums are good to some 10⁻⁶.
-pub(super) fn nodes(knees: &[Knee], ripples: &Ripples, is_fine: bool) -> Option<Vec<(f64, f64)>> {
+/// What a sum over amplitudes is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// Moments, as exact as can be, and what rounding makes of them.
+    Moments,
+    /// Variances, to some 10⁻⁶.
+    Variances,
+    /// Shares, however small, to some 10⁻⁶ of what photosites that differ have of them.
+    Shares,
+}
+
+/// Whether the variance of what is read of a charge of such mean and variance, noise included, is about that: codes are fine, and no more
+/// than few are cut off.
+pub(super) fn is_read_as_charge(adc: Option<AdcRecord>, full_well_e: f64, [mean_e, variance]: [f64; 2]) -> bool {
+    const WITHIN: f64 = 2.0;
+    const FINE: f64 = 0.5;
+    let std = variance.sqrt();
+    let [low, high] = [mean_e - WITHIN * std, mean_e + WITHIN * std];
+    let is_coded = |adc: AdcRecord| {
+        let [lowest, highest] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
+        adc.adu_per_e * std >= FINE && low > lowest && high < highest
+    };
+    high < full_well_e && adc.is_none_or(is_coded)
+}
+
+/// How much excesses between two make of a variance at most, where their square is `share` of that of the others: what all panels of a sum
+/// are good to by themselves may be the less the less it is.
+fn matters(share: f64, [low, high]: [f64; 2]) -> f64 {
+    share * (1.0 + high * high) * (-low).exp() / (1.0 + 2.0 * share)
+}
+
+/// Places and weights of an exponential number of mean 1 for a function that bends at `knees`, and is rounded; none of too many. The square
+/// of what photosites differ in is `share` of the variance of the others; ∞ where that is not known.
+pub(super) fn nodes(knees: &[Knee], ripples: &Ripples, share: f64, wanted: Wanted) -> Option<Vec<(f64, f64)>> {
+    // Of a variance, panels of 12 nodes are good to 10⁻¹⁰ of what they make of it, of 8 to 10⁻⁶, and of 5 to 10⁻⁴; the widest of 5 to
+    // a hundredth: all together to 5·10⁻⁹ of the variance, or 10⁻⁶.
+    const OF_FEW: f64 = 1e-4;
+    const OF_FEWEST: f64 = 1e-6;
+    const OF_FEWEST_IF_COARSE: f64 = 1e-2;
     static SMOOTH_NODES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(10));
     // e^(−t) grows by the panel: on each of these 12 nodes sum it to 10⁻¹³ of the whole.
     const WIDEST: [f64; 5] = [0.0, 4.0, 10.0, 20.0, REACH];
@@ -142,7 +179,16 @@ pub(super) fn nodes(knees: &[Knee], ripples: &Ripples, is_fine: bool) -> Option<
     ends.dedup_by(|next, kept| *next - *kept < 1e-7);
     let of_panel = |pair: &[f64]| -> Vec<(f64, f64)> {
         let at = |(t, weight): (f64, f64)| (t, weight * (-t).exp());
-        if is_fine { panel(pair[0], pair[1]).map(at).collect() } else { few(pair[0], pair[1]).map(at).collect() }
+        let [low, high] = [pair[0], pair[1]];
+        // Ripples take as many wherever they are.
+        let is_known = ripples.is_none() && share.is_finite();
+        let of_all = if is_known { matters(share, [low, high]) } else { f64::INFINITY };
+        match wanted {
+            Wanted::Moments if of_all < OF_FEWEST => fewest(low, high).map(at).collect(),
+            Wanted::Variances if of_all < OF_FEWEST_IF_COARSE => fewest(low, high).map(at).collect(),
+            Wanted::Moments if of_all >= OF_FEW => panel(low, high).map(at).collect(),
+            _ => few(low, high).map(at).collect(),
+        }
     };
     let mut found: Vec<(f64, f64)> = ends.windows(2).flat_map(of_panel).collect();
     found.retain(|(_, weight)| *weight > 1e-13);
@@ -166,7 +212,7 @@ mod tests {
             ),
         ];
         for (knees, codes) in cases {
-            let found = nodes(&knees, &codes, true).unwrap();
+            let found = nodes(&knees, &codes, f64::INFINITY, Wanted::Moments).unwrap();
             let mean = |f: &dyn Fn(f64) -> f64| found.iter().map(|(t, weight)| weight * f(*t)).sum::<f64>();
             let mut factorial = 1.0;
             for power in 1..=8 {
@@ -178,7 +224,32 @@ mod tests {
             assert!((mean(&|t| (-0.2 * t).exp()) - 1.0 / 1.2).abs() < 1e-9);
         }
         let sharp = Rounded { share: 1.0, mean_e: 1000.0, is_counted: false, adu_per_e: 1.0 };
-        assert!(nodes(&[], &ripples(&sharp, 0.0), true).is_none());
+        assert!(nodes(&[], &ripples(&sharp, 0.0), 1.0, Wanted::Moments).is_none());
+    }
+
+    /// What is cut off at a knee, e^(−a) beyond a, its mean and square; of so few, and of so little that each share counts by itself.
+    #[test]
+    fn few_excesses_take_few_nodes() {
+        let a: f64 = 2.0;
+        let expected = [1.0 + a, 2.0 + 2.0 * a + a * a].map(|rest| rest * (-a).exp());
+        for share in [1e-7, 1e-5, 1e-3, 0.1, 10.0, 1e4] {
+            let sums = |wanted: Wanted| {
+                let knees = [Knee { at: a, width: 1e-5, reach: 9.0 }];
+                let found = nodes(&knees, &Ripples::default(), share, wanted).unwrap();
+                let beyond = found.iter().filter(|(t, _)| *t > a);
+                let sums =
+                    beyond.fold([0.0; 2], |[first, second], (t, weight)| [first + t * weight, second + t * t * weight]);
+                (found.len(), [0, 1].map(|k| (sums[k] - expected[k]).abs()))
+            };
+            // Of the variance of all, 1 + 2 share, the squares of these are `share` times their sum.
+            let of_all = share / (1.0 + 2.0 * share);
+            let (fine, errors) = sums(Wanted::Moments);
+            assert!(errors.iter().all(|error| of_all * error < 5e-9), "{share}: {errors:?}");
+            let (coarse, errors) = sums(Wanted::Variances);
+            assert!(errors.iter().all(|error| of_all * error < 1e-6), "{share}: {errors:?}");
+            let (shares, errors) = sums(Wanted::Shares);
+            assert!(errors.iter().all(|error| *error < 1e-6) && coarse <= shares && (fine < shares || share > 1e-5));
+        }
     }
 
     fn ripples(of: &Rounded, read_noise_e: f64) -> Ripples {
@@ -201,7 +272,7 @@ mod tests {
         ];
         for (share, mean_e, is_counted, adu_per_e, read_noise_e, most_turns) in cases {
             let of = Rounded { share, mean_e, is_counted, adu_per_e };
-            let found = nodes(&[], &ripples(&of, read_noise_e), true).unwrap();
+            let found = nodes(&[], &ripples(&of, read_noise_e), 1.0, Wanted::Moments).unwrap();
             for turns in 1..=most_turns {
                 let angle = std::f64::consts::TAU * adu_per_e * f64::from(turns);
                 let blurred = (-0.5 * (angle * read_noise_e).powi(2)).exp();

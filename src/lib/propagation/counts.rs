@@ -1,5 +1,6 @@
 //! The law of the electrons that light, or the dark signal, sets free in a photosite, as a sum over counts.
 
+use super::memory::Print;
 use crate::metadata::PoissonKind;
 use crate::random::poisson::probability;
 use nalgebra::DMatrix;
@@ -17,6 +18,12 @@ pub(super) struct Charge {
     pub shot: Option<PoissonKind>,
     /// σ, the rms of the sensitivities.
     pub pattern: f64,
+}
+
+impl Print for Charge {
+    fn print(&self, before: u64) -> u64 {
+        [self.rate, self.pattern].print(before)
+    }
 }
 
 /// A count, its weight, and the standard deviation of what it stands for.
@@ -126,14 +133,14 @@ impl Charge {
         }
         let step = self.step(smoothing).floor().max(1.0);
         // Narrow beside what it is summed with: Gauss's quadrature for the law of the counts themselves.
-        if smoothing >= 3.0 * sigma && self.rate >= 8.0 { self.gauss() } else { self.poisson(step) }
+        self.poisson(if smoothing >= 3.0 * sigma && self.rate >= 8.0 { GAUSS } else { step })
     }
 
     /// Gauss and Charlier's nodes, exact for polynomials of degree 19: eigenvalues of the matrix of the polynomials' recurrence, with
     /// λ + k on its diagonal and √(λ k) beside it.
-    fn gauss(&self) -> Vec<Count> {
+    fn gauss(rate: f64) -> Vec<(f64, f64)> {
         const NODES: usize = 10;
-        let sigma = self.rate.sqrt();
+        let sigma = rate.sqrt();
         // About the rate, so that nothing is lost of large ones.
         let recurrence = DMatrix::from_fn(NODES, NODES, |i, j| match i.abs_diff(j) {
             0 => i as f64,
@@ -142,12 +149,11 @@ impl Charge {
         });
         let solved = recurrence.symmetric_eigen();
         let count = |(index, offset): (usize, &f64)| {
-            let electrons = self.rate + offset;
-            let weight = solved.eigenvectors[(0, index)].powi(2);
-            Count { electrons, weight, spread: electrons * self.pattern }
+            let weight: f64 = solved.eigenvectors[(0, index)];
+            (rate + offset, weight * weight)
         };
-        let mut found: Vec<Count> = solved.eigenvalues.iter().enumerate().map(count).collect();
-        found.sort_by(|a, b| a.electrons.total_cmp(&b.electrons));
+        let mut found: Vec<(f64, f64)> = solved.eigenvalues.iter().enumerate().map(count).collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found
     }
 
@@ -163,6 +169,9 @@ impl Charge {
         known.iter().map(count).collect()
     }
 }
+
+/// What stands for the step where Gauss's quadrature is asked for.
+const GAUSS: f64 = 0.0;
 
 /// Counts and their probabilities that were asked for last, by the rate and the step between them.
 #[derive(Default)]
@@ -182,7 +191,8 @@ impl Probabilities {
         if let Some(found) = self.known.get(&key) {
             return Rc::clone(found);
         }
-        let found: Rc<[(f64, f64)]> = Self::work_out(rate, step).into();
+        let found = if step == GAUSS { Charge::gauss(rate) } else { Self::work_out(rate, step) };
+        let found: Rc<[(f64, f64)]> = found.into();
         if self.kept + found.len() > Self::MOST {
             *self = Self::default();
         }

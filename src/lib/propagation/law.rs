@@ -16,6 +16,7 @@ use super::reading::{ENDLESS, Moments, Reading, codes_of};
 use super::rectified::{corrections, signed_nodes};
 use crate::frame::to_sample;
 use crate::metadata::{AdcRecord, PoissonKind};
+use crate::numerics::normal::NearlyNormal;
 use crate::numerics::rounding::{REACH, Rounding, SMOOTH};
 use crate::stages::noise::NoiseModel;
 use std::cmp::Ordering;
@@ -56,16 +57,28 @@ impl Law {
 
     /// Whether codes are the charge, a uniform error, and nothing else.
     pub fn is_plain(&self, adc: &AdcRecord) -> bool {
-        let smoothing = self.read_noise_e.hypot(self.least_pattern_std());
-        let [low, high] = self.reach();
-        let top = f64::from(adc.top_code());
+        // Photosites of next to no sensitivity have next to no spread.
+        let spread_e = if self.is_rectified() { 0.0 } else { self.least_pattern_std() };
         adc.linearization.is_none()
-            && (adc.adu_per_e * smoothing >= SMOOTH || self.counts_hide(adc))
-            && !self.light.is_rectified(self.full_well_e)
-            && !self.dark.is_rectified(self.full_well_e)
+            && (adc.adu_per_e * self.read_noise_e.hypot(spread_e) >= SMOOTH || self.counts_hide(adc))
             && !self.reaches_full_well()
-            && adc.electrons_at(0.0) < low
-            && adc.electrons_at(top) > high
+            && (self.is_within(adc) || self.is_all_but_within(adc))
+    }
+
+    /// Whether next to none of what is read is beyond an end of the codes, of a charge that sensitivities of zero do not cut off: one in
+    /// 10¹⁵, 8 standard deviations off, and what skewness adds to that above.
+    fn is_all_but_within(&self, adc: &AdcRecord) -> bool {
+        const DEVIATIONS: f64 = 8.0;
+        const OF_SKEWNESS: f64 = (DEVIATIONS * DEVIATIONS - 1.0) / 6.0;
+        const SKEWED_E: f64 = 30.0;
+        if self.is_rectified() {
+            return false;
+        }
+        let read = self.cumulants().plus(NearlyNormal::normal(0.0, self.read_noise_e.powi(2)));
+        let reach = DEVIATIONS * read.variance.sqrt();
+        let skewed = if read.third > 0.0 { OF_SKEWNESS * read.third / read.variance + SKEWED_E } else { 0.0 };
+        adc.electrons_at(0.0) < read.mean - reach - self.trap_e
+            && adc.electrons_at(f64::from(adc.top_code())) > read.mean + reach + skewed + self.trap_e
     }
 
     /// Whether counts and read noise together leave next to nothing of how codes are rounded, as much as read noise of [`SMOOTH`]
@@ -140,11 +153,13 @@ impl Law {
     }
 
     /// Goes through the normal laws that make up that of the charge, as many as a sum over them needs that is smooth on the scale
-    /// of `noise_e` beside their own spread; `added_e` is what comes to the charge before it is read.
-    fn each_node(&self, noise_e: f64, added_e: f64, mut of: impl FnMut(Node)) {
-        if let Some(nodes) = self.nodes_of_sum(noise_e, added_e) {
+    /// of `noise_e` beside their own spread; of those from which the ends take nothing, where that is what is asked, none.
+    fn each_node(&self, noise_e: f64, reading: &Reading, mut of: impl FnMut(Node)) {
+        let idle = reading.idle_e();
+        let is_idle = |mean: f64, reach: f64| idle[0] < mean - reach && mean + reach < idle[1];
+        if let Some(nodes) = self.nodes_of_sum(noise_e, reading.noise_e) {
             effort::spend(nodes.len() as u64);
-            return nodes.into_iter().for_each(of);
+            return nodes.into_iter().filter(|node| !is_idle(node.mean, REACH * node.std)).for_each(of);
         }
         let is_light_wider = self.light.shot_std() >= self.dark.shot_std();
         let (wide, narrow) = if is_light_wider { (&self.light, &self.dark) } else { (&self.dark, &self.light) };
@@ -172,7 +187,8 @@ impl Law {
             }
             for outer in outer.into_iter().flatten() {
                 let weight = inner.weight * outer.weight;
-                if weight <= LEAST_WEIGHT {
+                let reach = REACH * (inner.spread + outer.spread);
+                if weight <= LEAST_WEIGHT || is_idle(inner.electrons + outer.electrons, reach) {
                     continue;
                 }
                 let std = match [inner.spread, outer.spread] {
@@ -264,6 +280,15 @@ impl Law {
         // Where the highest code hides full well, charges may go on beyond it.
         let is_full_hidden = full > reading.ends_e()[1];
         let is_full_far = is_full_hidden || !self.reaches_full_well();
+        if is_full_far && let Some(found) = self.in_closed_form(reading) {
+            return found;
+        }
+        self.sum_of_nodes(reading, is_full_far)
+    }
+
+    /// The sum over normal laws, which full well cuts unless it is far.
+    pub(super) fn sum_of_nodes(&self, reading: &Reading, is_full_far: bool) -> Moments {
+        let full = self.full_well_e;
         let mut sum = [0.0; 4];
         let mut add = |weight: f64, moments: Moments| {
             for (sum, moment) in sum.iter_mut().zip(moments) {
@@ -289,7 +314,7 @@ impl Law {
                 near.push(node);
             }
         };
-        self.each_node(if is_full_far { reading.noise_e } else { 0.0 }, reading.noise_e, &mut put);
+        self.each_node(if is_full_far { reading.noise_e } else { 0.0 }, reading, &mut put);
         if !is_full_far {
             signed_nodes(self).into_iter().for_each(put);
         }

@@ -12,6 +12,7 @@ pub mod bent_lines;
 mod blur;
 pub mod budget;
 mod charge;
+mod closed_form;
 mod columns;
 mod counts;
 pub mod covariance;

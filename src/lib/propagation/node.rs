@@ -1,6 +1,7 @@
 //! What the law of a photosite's charge is made of.
 
 use super::counts::Charge;
+use super::memory::Print;
 
 /// The law of the charge of one class of photosites.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +12,13 @@ pub(super) struct Law {
     pub read_noise_e: f64,
     /// Amplitude of what readings are off by in half of the exposures, up or down.
     pub trap_e: f64,
+}
+
+impl Print for Law {
+    fn print(&self, before: u64) -> u64 {
+        let numbers = [self.full_well_e, self.read_noise_e, self.trap_e];
+        ([self.light, self.dark], numbers).print(before)
+    }
 }
 
 /// A normal law among those that make up the law of the charge, before full well.

@@ -6,10 +6,10 @@
 
 use super::counts::{Charge, Count};
 use super::effort;
-use super::memory::Memory;
+use super::memory::{Memory, Print};
 use super::moments::Prediction;
 use super::node::Law;
-use super::pattern_nodes::{Axis, Knee, fine_sensitivities, sensitivities};
+use super::pattern_nodes::{Axis, Knee, fine_sensitivities, sensitivities, smooth_sensitivities};
 use super::reading::{Asked, Moments, Reading};
 use crate::metadata::PoissonKind;
 use crate::numerics::medians::median;
@@ -39,7 +39,21 @@ pub(super) struct Seen {
     pub is_fine: bool,
 }
 
+impl Print for Seen {
+    fn print(&self, before: u64) -> u64 {
+        let flags = f64::from(self.median_of.unwrap_or(0)) + if self.is_fine { 0.5 } else { 0.0 };
+        (self.law, self.reading, flags).print(before)
+    }
+}
+
 impl Seen {
+    /// Read noise, e⁻, that hides the codes of a charge which full well leaves alone; none of others.
+    fn hidden_e(&self) -> Option<f64> {
+        let noise_e = self.law.read_noise_e;
+        let is_hidden = self.median_of.is_none() && noise_e > 0.0 && self.reading.straight().is_some();
+        (is_hidden && !self.reading.is_coarse() && !self.law.reaches_full_well()).then_some(noise_e)
+    }
+
     /// Whether the means of photosites are alike, and no median is asked for: each holds full well in every exposure, all are read as
     /// one code, or patterns are a millionth of what is drawn anew, 10⁻¹² of the variance.
     fn is_even(&self) -> bool {
@@ -75,16 +89,17 @@ impl Shared {
         }
         let (of_light, of_dark) = (Temporal::of(light), Temporal::of(dark));
         let (law, is_fine) = (&light.law, light.is_fine || dark.is_fine);
-        let xs = if is_fine {
-            fine_sensitivities(&law.light, of_light.finest())
-        } else {
-            sensitivities(&law.light, of_light.std())
+        let hidden_e = [light, dark].map(Seen::hidden_e);
+        let at_std = |charge: &Charge| match hidden_e {
+            [Some(a), Some(b)] => smooth_sensitivities(charge, of_light.std(), a.min(b)),
+            _ => sensitivities(charge, of_light.std()),
         };
+        let xs = if is_fine { fine_sensitivities(&law.light, of_light.finest()) } else { at_std(&law.light) };
         let wider = if law.dark.rate > dark.law.dark.rate { law.dark } else { dark.law.dark };
         let ys = if is_fine {
             fine_sensitivities(&wider, of_light.finest().min(of_dark.finest()))
         } else {
-            sensitivities(&law.dark, of_light.std())
+            at_std(&law.dark)
         };
         let is_light_summed = of_light.evaluations(xs.len() * ys.len()) <= of_light.affordable();
         let is_dark_summed = of_dark.evaluations(ys.len()) <= of_dark.affordable();

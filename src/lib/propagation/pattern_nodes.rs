@@ -124,10 +124,23 @@ pub(super) fn fine_sensitivities(charge: &Charge, temporal: f64) -> Vec<(f64, f6
     sensitivities_by(charge, temporal, 2.0 * 1.3 * REACH / MOST_IF_FINE)
 }
 
-/// Steepness up to which few sensitivities tell a mean: Gauss and Hermite's rule of n nodes is off by n!/(2n)! of its 2n-th power,
-/// 10⁻¹².
-const SHALLOW: f64 = 0.3;
-static FEW: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| hermite(6));
+/// Steepness up to which few sensitivities tell a mean, and how many: Gauss and Hermite's rule of n nodes is off by n!/(2n)! of its 2n-th
+/// power, times the 2n-th derivative of what bends: 10⁻¹², and 5·10⁻⁹ of a bend as narrow as the steepest is for.
+const SHALLOW: [(f64, usize); 4] = [(1.8e-3, 2), (0.018, 3), (0.05, 4), (0.3, 6)];
+static FEW: LazyLock<[Vec<(f64, f64)>; 4]> = LazyLock::new(|| SHALLOW.map(|(_, nodes)| hermite(nodes)));
+
+/// Sensitivities and their weights for means that are smooth on the scale of such read noise, in e⁻, which hides the codes, and bend where
+/// these end: few where patterns are less; else as [`sensitivities`].
+pub(super) fn smooth_sensitivities(charge: &Charge, temporal: f64, noise_e: f64) -> Vec<(f64, f64)> {
+    let steepness = charge.pattern * charge.rate / noise_e;
+    let is_cut = charge.pattern * REACH >= 1.0;
+    match SHALLOW.iter().position(|(shallow, _)| steepness <= *shallow) {
+        Some(rule) if steepness > 0.0 && !is_cut => {
+            FEW[rule].iter().map(|(z, weight)| (1.0 + charge.pattern * z, *weight)).collect()
+        }
+        _ => sensitivities(charge, temporal),
+    }
+}
 
 fn sensitivities_by(charge: &Charge, temporal: f64, narrowest: f64) -> Vec<(f64, f64)> {
     let sigma = charge.pattern;
@@ -137,8 +150,8 @@ fn sensitivities_by(charge: &Charge, temporal: f64, narrowest: f64) -> Vec<(f64,
     let steepness = sigma * charge.rate / temporal;
     let scale = (1.0 / (1.0 + steepness * steepness).sqrt()).max(narrowest);
     let lowest = (-1.0 / sigma).max(-REACH);
-    if lowest <= -REACH && steepness <= SHALLOW {
-        return FEW.iter().map(|(z, weight)| (1.0 + sigma * z, *weight)).collect();
+    if lowest <= -REACH && steepness <= SHALLOW[3].0 {
+        return FEW[3].iter().map(|(z, weight)| (1.0 + sigma * z, *weight)).collect();
     }
     if lowest <= -REACH {
         let step = scale / 1.3;
@@ -161,4 +174,25 @@ fn sensitivities_by(charge: &Charge, temporal: f64, narrowest: f64) -> Vec<(f64,
         low += width;
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a bend that is as wide as the noise, E Φ(a + s z) = Φ(a/√(1 + s²)); each rule at the steepest that it is for.
+    #[test]
+    fn few_sensitivities_follow_bends() {
+        for (steepness, nodes, within) in [(1.7e-3, 2, 2e-12), (0.017, 3, 2e-12), (0.049, 4, 2e-12), (0.29, 6, 5e-9)] {
+            let (rate, noise_e) = (200.0, 5.0);
+            let charge = Charge { rate, shot: None, pattern: steepness * noise_e / rate };
+            let found = smooth_sensitivities(&charge, 12.0, noise_e);
+            assert_eq!(found.len(), nodes);
+            for a in [-4.0, -1.5, 0.0, 0.7, 3.0] {
+                let mean: f64 =
+                    found.iter().map(|(x, weight)| weight * cumulative(a + (x - 1.0) * rate / noise_e)).sum();
+                assert!((mean - cumulative(a / steepness.hypot(1.0))).abs() < within, "{steepness} {a}: {mean}");
+            }
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use super::charge::{charge, sensitivity};
 use super::law::Law;
 use super::masters::{Dark, Flat, MOST_DARKS};
+use super::memory::Print;
 use super::moments::{Equations, Prediction};
 use super::pattern::{Seen, Shared};
 use super::reading::{Reading, codes_of};
@@ -68,6 +69,19 @@ pub struct Photosite {
     pub equations: Equations,
     /// Whether so few photosites are such that it does not matter where in a code full well lies.
     pub is_rare: bool,
+}
+
+impl Print for NoiseModel {
+    fn print(&self, before: u64) -> u64 {
+        [self.dark_e, self.dcnu, self.prnu, self.read_noise_e, self.tails.trap_e, self.tails.hot_share].print(before)
+    }
+}
+
+impl Print for Photosite {
+    fn print(&self, before: u64) -> u64 {
+        let of_darks = |before: u64| self.darks.iter().flatten().fold(before, |before, dark| dark.model.print(before));
+        of_darks((self.model, self.slope()).print(before))
+    }
 }
 
 impl Photosite {

@@ -1,6 +1,7 @@
 //! What is asked of a photosite's charge: the moments of its electrons or codes, or the chance to be beyond a level.
 
 use super::bent;
+use super::memory::Print;
 use crate::metadata::AdcRecord;
 use crate::numerics::normal::cumulative;
 use crate::numerics::rounding::{REACH, Rounding, SMOOTH, about};
@@ -23,12 +24,21 @@ pub(super) struct Reading {
     pub smooth_from: f64,
 }
 
+impl Print for Reading {
+    fn print(&self, before: u64) -> u64 {
+        let [lower, upper] = self.rails_e();
+        [self.noise_e, self.center, self.offset_e, self.smooth_from, lower, upper].print(before)
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Asked {
     /// Moments of the electrons.
     Electrons,
     /// Moments of the codes between these.
     Codes(AdcRecord, Rounding),
+    /// What the ends take from moments of straight codes whose rounding is a uniform error.
+    Taken(AdcRecord, Rounding),
     /// The probability to be beyond a charge, as the first moment.
     Beyond(f64),
 }
@@ -68,6 +78,50 @@ impl Reading {
         Self { smooth_from: 0.0, ..*self }
     }
 
+    /// The slope by the charge, and the variance and fourth cumulant of the error, of a reading that is straight but for its ends; none of
+    /// others.
+    pub fn straight(&self) -> Option<[f64; 3]> {
+        self.straight_where(|_| false)
+    }
+
+    /// The same where something else hides the codes.
+    pub fn straight_where(&self, are_hidden: impl Fn(&AdcRecord) -> bool) -> Option<[f64; 3]> {
+        let square = self.noise_e * self.noise_e;
+        match self.asked {
+            Asked::Electrons => Some([1.0, square, 0.0]),
+            Asked::Codes(adc, _) if !self.is_bent() && (self.visible_code_e().is_none() || are_hidden(&adc)) => {
+                Some([adc.adu_per_e, adc.adu_per_e * adc.adu_per_e * square + 1.0 / 12.0, -1.0 / 120.0])
+            }
+            _ => None,
+        }
+    }
+
+    /// What the ends take from what is asked; none where noise does not hide the codes.
+    pub fn taken(&self) -> Option<Self> {
+        match self.asked {
+            Asked::Codes(adc, ends) if !self.is_bent() && adc.adu_per_e * self.noise_e >= SMOOTH => {
+                Some(Self { asked: Asked::Taken(adc, ends), ..*self })
+            }
+            _ => None,
+        }
+    }
+
+    /// Charges within which the ends take nothing from what is read of a normal law, less what it reaches; none of other readings.
+    pub fn idle_e(&self) -> [f64; 2] {
+        match self.asked {
+            Asked::Taken(..) => {
+                let ([lower, upper], reach) = (self.rails_e(), REACH * self.noise_e);
+                [lower + reach, upper - reach]
+            }
+            _ => [f64::INFINITY, f64::NEG_INFINITY],
+        }
+    }
+
+    /// Whether rounding is taken for a uniform error whatever the noise.
+    pub fn is_coarse(&self) -> bool {
+        self.smooth_from < SMOOTH
+    }
+
     /// Whether what is asked are codes that are not straight.
     pub fn is_bent(&self) -> bool {
         matches!(self.asked, Asked::Codes(adc, _) if adc.linearization.is_some())
@@ -94,6 +148,9 @@ impl Reading {
             }
             Asked::Codes(adc, ends) => {
                 ends.moments(adc.level_at(electrons), adc.adu_per_e * variance.sqrt(), self.center)
+            }
+            Asked::Taken(adc, ends) => {
+                ends.taken_by_ends(adc.level_at(electrons), adc.adu_per_e * variance.sqrt(), self.center)
             }
             Asked::Beyond(level) => {
                 let share = if variance > 0.0 {
@@ -135,16 +192,9 @@ impl Reading {
     /// The slope by the charge and the variance of the error of readings that are straight from one charge to another; none where
     /// codes show, are not straight, or end.
     pub fn straight_between(&self, low: f64, high: f64) -> Option<(f64, f64)> {
-        let square = self.noise_e * self.noise_e;
-        match self.asked {
-            Asked::Electrons => Some((1.0, square)),
-            Asked::Codes(adc, _) if !self.is_bent() && self.visible_code_e().is_none() => {
-                let ([lower, upper], reach) = (self.rails_e(), REACH * self.noise_e);
-                let is_free = low - reach > lower && high + reach < upper;
-                is_free.then_some((adc.adu_per_e, adc.adu_per_e * adc.adu_per_e * square + 1.0 / 12.0))
-            }
-            _ => None,
-        }
+        let [slope, variance, _] = self.straight()?;
+        let ([lower, upper], reach) = (self.rails_e(), REACH * self.noise_e);
+        (low - reach > lower && high + reach < upper).then_some((slope, variance))
     }
 
     /// How far from a charge, up (`direction` 1) or down (−1), the chance to be beyond a level is one number, to 10⁻¹⁷; none of other
@@ -199,7 +249,7 @@ impl Reading {
         let reach = REACH * self.noise_e;
         match self.asked {
             Asked::Electrons => [f64::NEG_INFINITY, f64::INFINITY],
-            Asked::Codes(adc, ends) => {
+            Asked::Codes(adc, ends) | Asked::Taken(adc, ends) => {
                 let [low, high] = [ends.lowest - 0.5, ends.highest + 0.5].map(|code| self.charge_at(&adc, code));
                 [low - reach, high + reach]
             }
@@ -211,7 +261,9 @@ impl Reading {
     pub fn rails_e(&self) -> [f64; 2] {
         match self.asked {
             Asked::Electrons => [f64::NEG_INFINITY, f64::INFINITY],
-            Asked::Codes(adc, ends) => [ends.lowest, ends.highest].map(|code| self.charge_at(&adc, code)),
+            Asked::Codes(adc, ends) | Asked::Taken(adc, ends) => {
+                [ends.lowest, ends.highest].map(|code| self.charge_at(&adc, code))
+            }
             Asked::Beyond(level) => [level - self.offset_e; 2],
         }
     }

@@ -22,6 +22,9 @@ const MOST_EDGES: u32 = 40;
 /// Weights below this do not count.
 const LEAST_WEIGHT: f64 = 1e-13;
 
+/// The same of pairs of them.
+const NEGLIGIBLE: f64 = 1e-17;
+
 /// Whether full well cuts the law of a charge.
 fn is_cut(count: &Count, full_well_e: f64) -> bool {
     count.spread > 0.0 && count.electrons + REACH * count.spread >= full_well_e
@@ -214,14 +217,23 @@ fn of_shared(
     let share = |place: &Place| (place.electrons, place.weight * densities.at(place.electrons));
     let shared: Vec<(f64, f64)> = places.iter().map(share).collect();
     let gone: f64 = shared.iter().map(|(_, weight)| weight).sum();
-    for other in others {
+    // Whatever leaves such laws, the ends take nothing from them.
+    let idle = reading.idle_e();
+    let is_idle = |other: &Count| {
+        let reach = REACH * other.spread;
+        idle[0] < other.electrons - base.extent - reach && other.electrons + reach < idle[1]
+    };
+    for other in others.iter().filter(|other| !is_idle(other)) {
         add(&mut sum, other.weight * gone, reading.at(other.electrons.min(full), other.spread.powi(2)));
     }
     // What is moved is a polynomial where codes are many, or none, and nothing ends.
     let is_polynomial = reading.is_endless() && (is_many || code.is_none());
-    for other in few.filter(|_| is_polynomial).map_or(others, Vec::as_slice) {
+    for other in few.filter(|_| is_polynomial).map_or(others, Vec::as_slice).iter().filter(|other| !is_idle(other)) {
         let variance = other.spread * other.spread;
         for &(below, weight) in &shared {
+            if weight * other.weight.abs() < NEGLIGIBLE {
+                continue;
+            }
             let at = (other.electrons + below).min(full);
             let is_free = is_many && reading.is_free_at(at, variance);
             let moved = if is_free { smooth(reading, at, variance) } else { reading.at(at, variance) };

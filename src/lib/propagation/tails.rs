@@ -10,7 +10,7 @@
 //! with w the weights of quadrature in t and s: Gauss and Laguerre's, exact for polynomials of degree 19, where nothing ends or
 //! shows how codes are rounded as far as e^(−40); else panels that narrow towards full well and the ends of the codes.
 
-use super::amplitudes::{Knee, REACH, Ripples, Rounded, nodes, telling};
+use super::amplitudes::{Knee, REACH, Ripples, Rounded, Wanted, is_read_as_charge, nodes, telling};
 use super::blur::blur_e;
 use super::budget::{Budget, Cause};
 use super::charge::charge;
@@ -118,8 +118,8 @@ impl Photosite {
         }
         let amplitude_e = self.most(|tails| tails.rts_e);
         let is_too_fine = |expected_e: f64| {
-            self.hot_nodes(expected_e, true).is_none()
-                || self.trap_nodes(expected_e, true).is_none() && self.jumps_show(expected_e, amplitude_e)
+            self.hot_nodes(expected_e, Wanted::Moments).is_none()
+                || self.trap_nodes(expected_e, Wanted::Moments).is_none() && self.jumps_show(expected_e, amplitude_e)
         };
         if expected_e.into_iter().any(is_too_fine) {
             return beyond(TOO_FINE);
@@ -140,11 +140,11 @@ impl Photosite {
 
     /// What holds for each kind of photosites: those that jump apart only where jumps show how codes are rounded, or end; where the rounding
     /// of codes shows, all amplitudes that tell it, or few.
-    fn each_of<T>(&self, expected_e: f64, is_fine: bool, of: impl Fn(&Self) -> T) -> Vec<Kind<T>> {
+    fn each_of<T>(&self, expected_e: f64, wanted: Wanted, of: impl Fn(&Self) -> T) -> Vec<Kind<T>> {
         let [hot_share, trap_share] = [self.most(|tails| tails.hot_share), self.most(|tails| tails.rts_share)];
         let mut kinds = vec![(0.0, 1.0 - hot_share)];
         if hot_share > 0.0 {
-            let nodes = self.hot_nodes(expected_e, is_fine).unwrap_or_default();
+            let nodes = self.hot_nodes(expected_e, wanted).unwrap_or_default();
             kinds.extend(nodes.iter().map(|(t, weight)| (*t, hot_share * weight)));
         }
         let sum: f64 = kinds.iter().map(|(_, weight)| weight).sum();
@@ -177,8 +177,8 @@ impl Photosite {
             if !jumps_apart {
                 continue;
             }
-            let traps = match hot == 0.0 && is_fine {
-                true => self.trap_nodes(expected_e, true).unwrap_or_default(),
+            let traps = match hot == 0.0 && wanted == Wanted::Moments {
+                true => self.trap_nodes(expected_e, Wanted::Moments).unwrap_or_default(),
                 false => FEW.clone(),
             };
             let all: f64 = traps.iter().map(|(_, weight)| weight).sum();
@@ -262,10 +262,11 @@ impl Photosite {
         std::iter::once(full_e).chain(ends).filter(|level| level.is_finite())
     }
 
-    /// Amplitudes of hot photosites; where `is_fine` as many as tell how codes are rounded.
-    fn hot_nodes(&self, expected_e: f64, is_fine: bool) -> Option<Vec<(f64, f64)>> {
+    /// Amplitudes of hot photosites, as many as tell what is wanted.
+    fn hot_nodes(&self, expected_e: f64, wanted: Wanted) -> Option<Vec<(f64, f64)>> {
         let mut knees: Vec<Knee> = Vec::new();
         let mut ripples = Ripples::default();
+        let mut share = 0.0_f64;
         for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_hot()) {
             let hot_e = model.tails.hot_e;
             let cold = charge(model, light_e);
@@ -278,9 +279,12 @@ impl Photosite {
             }));
             // So bright few are that it does not matter whether they are cut off.
             let variance = cold.variance + model.added().powi(2);
-            let farthest = telling(model.tails.hot_share * hot_e * hot_e / variance);
+            let of_squares = model.tails.hot_share * hot_e * hot_e / variance;
+            let is_told = is_read_as_charge(self.adc, model.full_well_e, [cold.mean, variance]);
+            share = if is_told { share.max(of_squares).max(model.tails.hot_share) } else { f64::INFINITY };
+            let farthest = telling(of_squares);
             knees.retain(|knee| knee.at - 3.0 * knee.width < farthest);
-            if let Some(adc) = self.adc.filter(|_| is_fine) {
+            if let Some(adc) = self.adc.filter(|_| wanted == Wanted::Moments) {
                 let law = Law { trap_e: 0.0, ..Law::of(model, light_e) };
                 let of = Rounded {
                     share: model.tails.hot_share,
@@ -291,26 +295,30 @@ impl Photosite {
                 ripples.add(&of, |angle| law.damping(angle));
             }
         }
-        nodes(&knees, &ripples, is_fine)
+        nodes(&knees, &ripples, share, wanted)
     }
 
-    /// Amplitudes of jumps; where `is_fine` as many as tell how codes are rounded.
-    fn trap_nodes(&self, expected_e: f64, is_fine: bool) -> Option<Vec<(f64, f64)>> {
-        let Some(adc) = self.adc else { return nodes(&[], &Ripples::default(), is_fine) };
+    /// Amplitudes of jumps, as many as tell what is wanted.
+    fn trap_nodes(&self, expected_e: f64, wanted: Wanted) -> Option<Vec<(f64, f64)>> {
+        let Some(adc) = self.adc else { return nodes(&[], &Ripples::default(), 0.0, wanted) };
         let mut knees = Vec::new();
         let mut ripples = Ripples::default();
+        let mut share = 0.0_f64;
         for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_rts()) {
             let amplitude_e = model.tails.rts_e;
             let cold = charge(model, light_e);
             let mean_e = cold.mean.min(model.full_well_e);
             let width = (cold.variance + model.added().powi(2)).sqrt();
+            let of_squares = model.tails.rts_share * (amplitude_e / width).powi(2);
+            let is_told = is_read_as_charge(self.adc, model.full_well_e, [cold.mean, width * width]);
+            share = if is_told { share.max(of_squares).max(model.tails.rts_share) } else { f64::INFINITY };
             let ends = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
             knees.extend(ends.map(|end| Knee {
                 at: (end - mean_e).abs() / amplitude_e,
                 width: width / amplitude_e,
                 reach: 24.0,
             }));
-            if !is_fine {
+            if wanted != Wanted::Moments {
                 continue;
             }
             let quiet = model.at(&State { hot: 0.0, trap: 0.0 });
@@ -323,7 +331,7 @@ impl Photosite {
             };
             ripples.add(&of, |angle| law.damping(angle));
         }
-        nodes(&knees, &ripples, is_fine)
+        nodes(&knees, &ripples, share, wanted)
     }
 
     /// What photosites of a line differ in, each of what a part of their noise leaves; for sums over the rest.
@@ -337,9 +345,9 @@ impl Photosite {
             let sum: f64 = nodes.iter().map(|(_, weight)| weight).sum();
             nodes.into_iter().map(|(at, weight)| (share * weight / sum, at)).collect()
         };
-        let hot = of_share(self.hot_nodes(expected_e, false), hot_share);
+        let hot = of_share(self.hot_nodes(expected_e, Wanted::Variances), hot_share);
         let jumps_show = trap_share > 0.0 && self.jumps_show(expected_e, trap_e);
-        let jumps = of_share(self.trap_nodes(expected_e, false), if jumps_show { trap_share } else { 0.0 });
+        let jumps = of_share(self.trap_nodes(expected_e, Wanted::Variances), if jumps_show { trap_share } else { 0.0 });
         Kinds {
             laws: std::iter::once((1.0 - hot_share, 0.0)).chain(hot).map(|(share, hot)| (share, law(hot))).collect(),
             jumps: jumps.into_iter().map(|(share, trap)| (share, trap_e * trap)).collect(),
@@ -360,17 +368,17 @@ impl Photosite {
     /// No numbers where it takes too long.
     fn work_out(&self, expected_e: f64) -> (Prediction, f64) {
         let none = Prediction::of_cumulants(f64::NAN, f64::NAN, f64::NAN, f64::NAN);
-        effort::within(MOST_WORK, || self.mixture_of_kinds(expected_e, true)).unwrap_or((none, f64::NAN))
+        effort::within(MOST_WORK, || self.mixture_of_kinds(expected_e, Wanted::Moments)).unwrap_or((none, f64::NAN))
     }
 
     /// The variance of all together by few amplitudes, which tell it where the rounding of codes does not show; no number where it takes
     /// too long.
     pub(super) fn variance_by_few(&self, expected_e: f64) -> f64 {
-        let variance = || self.mixture_of_kinds(expected_e, false).0.moments.variance;
+        let variance = || self.mixture_of_kinds(expected_e, Wanted::Variances).0.moments.variance;
         effort::within(MOST_WORK, variance).unwrap_or(f64::NAN)
     }
 
-    fn mixture_of_kinds(&self, expected_e: f64, is_fine: bool) -> (Prediction, f64) {
+    fn mixture_of_kinds(&self, expected_e: f64, wanted: Wanted) -> (Prediction, f64) {
         let [second, fourth, sixth] = self.jump_cumulants();
         let with_jumps = |kind: Kind<Prediction>| {
             let Kind { weight, is_free, value } = kind;
@@ -381,7 +389,7 @@ impl Photosite {
             let with = Prediction::of_cumulants(value.moments.mean, variance, value.third, of_fourth);
             (weight, Prediction { sixth: value.sixth + sixth, ..with })
         };
-        let kinds = self.each_of(expected_e, is_fine, |site| {
+        let kinds = self.each_of(expected_e, wanted, |site| {
             // Sixth cumulant of −a, 0 or a.
             let trap = 0.5 * (site.slope() * site.model.tails.trap_e).powi(6);
             Prediction { sixth: trap, ..site.moments(expected_e) }
@@ -396,7 +404,7 @@ impl Photosite {
     /// The mean over all kinds of photosites of a number that no rounding shows in, and that jumps do not change where they are free, to
     /// some 10⁻⁶ of what the hot ones have; no number where it takes too long.
     pub(super) fn mean_of(&self, expected_e: f64, of: impl Fn(&Self) -> f64) -> f64 {
-        let mean = || self.each_of(expected_e, false, of).iter().map(|kind| kind.weight * kind.value).sum();
+        let mean = || self.each_of(expected_e, Wanted::Shares, of).iter().map(|kind| kind.weight * kind.value).sum();
         effort::within(MOST_WORK, mean).unwrap_or(f64::NAN)
     }
 
@@ -410,7 +418,7 @@ impl Photosite {
         if whole.moments.variance.is_nan() {
             return [f64::NAN; Cause::ALL.len()];
         }
-        let kinds = || self.each_of(expected_e, false, |site| site.budget(expected_e));
+        let kinds = || self.each_of(expected_e, Wanted::Variances, |site| site.budget(expected_e));
         let Some(kinds) = effort::within(MOST_WORK, kinds) else { return [f64::NAN; Cause::ALL.len()] };
         let mut budget =
             Cause::ALL.map(|cause| kinds.iter().map(|kind| kind.weight * kind.value[cause as usize]).sum::<f64>());
@@ -433,7 +441,7 @@ impl Photosite {
     fn temporal_of_kinds(&self, expected_e: f64) -> f64 {
         let [jumps, ..] = self.jump_cumulants();
         let drawn = |site: &Self| site.temporal_variance(expected_e, site.moments(expected_e).moments.variance);
-        let kinds = effort::within(MOST_WORK, || self.each_of(expected_e, true, drawn));
+        let kinds = effort::within(MOST_WORK, || self.each_of(expected_e, Wanted::Moments, drawn));
         let of_kind = |kind: &Kind<f64>| kind.weight * (kind.value + if kind.is_free { jumps } else { 0.0 });
         kinds.map_or(f64::NAN, |kinds| kinds.iter().map(of_kind).sum())
     }
@@ -490,7 +498,7 @@ mod tests {
         let site = Photosite::of_electrons(model, Equations::Exact);
         let spent = |allowed: u64| {
             let before = effort::left();
-            let found = effort::within(allowed, || site.mixture_of_kinds(1.5, true).0.moments.mean);
+            let found = effort::within(allowed, || site.mixture_of_kinds(1.5, Wanted::Moments).0.moments.mean);
             (found.is_none(), before - effort::left())
         };
         let first = spent(20_000);
