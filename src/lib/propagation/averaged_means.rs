@@ -85,9 +85,11 @@ impl Averaging {
         }
     }
 
-    /// Photosites of a line that has such a share of the light, about the center that `about` has; where full well is out of reach its gain
-    /// is an offset, and shot noise that of the mean light.
-    pub fn line(&self, share: f64, about: &Law, adc: Option<AdcRecord>) -> AveragedMeans<'_> {
+    /// Photosites of a line that has such a share of the light, about one center for all; where full well is out of reach its gain is an
+    /// offset, and shot noise that of the mean light.
+    pub fn line(&self, share: f64, adc: Option<AdcRecord>) -> AveragedMeans<'_> {
+        // What is read has the noise of this law, too.
+        let about = self.anew.most();
         let means = |(weight, law): (f64, Law)| {
             let kind = Kinds { laws: vec![(1.0, law)], jumps: self.anew.jumps.clone() };
             (weight, LineMeans::of(&kind, about, adc, self.blur_e).smooth_over(self.smooth_e))
@@ -147,6 +149,7 @@ impl AveragedMeans<'_> {
 mod tests {
     use super::*;
     use crate::propagation::Equations;
+    use crate::propagation::reading::codes_of;
     use crate::stages::noise::Tails;
     use std::f64::consts::TAU;
 
@@ -169,9 +172,10 @@ mod tests {
     /// Mean about the center and variance in an average of so many exposures, in a line that is off by such a share and so much.
     fn of_average(site: &Photosite, expected_e: f64, frames: u32, share: f64, offset_e: f64) -> [f64; 2] {
         let averaging = Averaging::of(site, expected_e, |model| *model, 0.0, frames);
-        let about = Law::of(&site.model, expected_e);
-        let [mean, square] = averaging.line(share, &about, site.adc).at(offset_e);
-        [mean, square - mean * mean]
+        let [mean, square] = averaging.line(share, site.adc).at(offset_e);
+        let center = |law: &Law| site.adc.map_or(0.0, |adc| law.of_codes(&adc, codes_of(&adc)).center);
+        let moved = center(averaging.anew.most()) - center(&Law::of(&site.model, expected_e));
+        [mean + moved, square - mean * mean]
     }
 
     /// Two exposures of a photosite are on one side of a step of one bit with the correlation asin ρ/2π in squared codes \[Sheppard1899], ρ the share

@@ -72,7 +72,7 @@ struct Class {
 
 /// Photosites of one class in one line.
 enum Means<'a> {
-    OfOne(LineMeans),
+    OfOne(Box<LineMeans>),
     OfAverage(AveragedMeans<'a>),
 }
 
@@ -233,8 +233,8 @@ impl Shared {
         let means = |k: usize, class: &'_ Class| {
             let about = self.classes[k].kinds.most();
             match &self.classes[k].averaging {
-                None => Means::OfOne(LineMeans::of(&gained[k], about, class.adc, class.blur_e)),
-                Some(averaging) => Means::OfAverage(averaging.line(share, about, class.adc)),
+                None => Means::OfOne(Box::new(LineMeans::of(&gained[k], about, class.adc, class.blur_e))),
+                Some(averaging) => Means::OfAverage(averaging.line(share, class.adc)),
             }
         };
         self.classes.iter().enumerate().map(|(k, class)| (class.same == k).then(|| means(k, class))).collect()

@@ -56,7 +56,11 @@ impl Known {
 }
 
 /// What is predicted of the samples of a region of a frame; pixels that do not say where they were mirrored were so at its edges.
-pub(super) fn of_samples(frame: &FrameHeader, region: Region, equations: Equations) -> Result<FramePrediction, Unpredictable> {
+pub(super) fn of_samples(
+    frame: &FrameHeader,
+    region: Region,
+    equations: Equations,
+) -> Result<FramePrediction, Unpredictable> {
     let mut header = region.header(frame);
     if let Some(record) = header.metadata.demosaic.as_mut().filter(|_| frame.taps().is_none()) {
         record.plane.get_or_insert(frame.geometry.on_sensor());

@@ -173,7 +173,9 @@ pub fn measure(
     let reports: Vec<RegionReport> = match known {
         Ok(known) => {
             let tallies = tallies.iter().zip(regions);
-            tallies.map(|(tally, region)| as_uniform(known, tally, &frame, region).report(&frame, region, &levels)).collect()
+            tallies
+                .map(|(tally, region)| as_uniform(known, tally, &frame, region).report(&frame, region, &levels))
+                .collect()
         }
         Err(why) => {
             // Patches of a scene that is not uniform are predicted at their own means.
@@ -272,11 +274,7 @@ fn at_means(tally: &Tally, frame: &FrameHeader, region: Region, equations: Equat
 
 /// The uniform scene whose predicted means lead back to such electrons, and what is predicted of it: where full well or an end of the codes holds
 /// means back it is brighter, or darker, than these; none where no level is known to lead there.
-fn at_level(
-    measured: [f64; 3],
-    frame: &FrameHeader,
-    equations: Equations,
-) -> Option<(FrameHeader, FramePrediction)> {
+fn at_level(measured: [f64; 3], frame: &FrameHeader, equations: Equations) -> Option<(FrameHeader, FramePrediction)> {
     /// Distances below this share of shot noise, or of an electron, do not count.
     const NEAR: f64 = 0.02;
     const STEPS: usize = 12;
