@@ -31,7 +31,7 @@ impl Known {
     pub fn checked(&mut self) -> Result<&mut Self, Unpredictable> {
         match &self.prediction {
             Ok(_) => Ok(self),
-            Err(why) => Err(why.clone()),
+            Err(why) => Err(*why),
         }
     }
 
