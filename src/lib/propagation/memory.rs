@@ -128,7 +128,7 @@ mod tests {
             };
             effort::counted(|| memory.recall(number, work_out))
         };
-        let kept = KEPT as u32;
+        let kept = u32::try_from(KEPT).unwrap();
         effort::within(u64::MAX - 1, || {
             (0..2 * kept).map(f64::from).for_each(|number| assert_eq!(ask(number), (number, 3)));
             assert_eq!(worked.replace(0), 2 * kept);
