@@ -160,8 +160,8 @@ fn colors_of_an_unknown_exposure_are_relative() {
     let mut header = rgb.header.clone();
     header.metadata.exposure = None;
     shop.write("bare.exr", &header, &rgb.samples);
-    for matrix in ["", "--matrix sensor"] {
-        let said = shop.said(&format!("to-xyz bare.exr {matrix} -o relative.exr"), 0);
+    for matrix in ["", " --matrix sensor"] {
+        let said = shop.said(&format!("to-xyz bare.exr{matrix} -o relative.exr"), 0);
         assert!(said.contains("its exposure is not known: XYZ are relative, Y = 1 for the D65"), "{said}");
         let relative = shop.frame("relative.exr");
         // One factor: that by which the recorded white of absolute XYZ has Y = 1.

@@ -10,7 +10,7 @@ use cyanometer::stream::MemoryFrame;
 use std::fs;
 use std::path::{Path, PathBuf};
 use support::TREE;
-use support::dng::{dng, dng_with_ratios};
+use support::dng::{dng, dng_as_told, dng_with_ratios};
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// A DNG of 12x10 samples of 16 bits, whose active area begins at column 3, row 2.
@@ -89,14 +89,14 @@ fn masked_photosites_without_a_black_level_are_told() {
     let shop = Workshop::new();
     let strip: Vec<u8> = (0..120_u16).flat_map(|i| (300 + i).to_le_bytes()).collect();
     let said = |name: &str, areas: &[(u16, &[u32])]| {
-        fs::write(shop.path(name), dng([12, 10], 16, 1, &strip, areas)).unwrap();
+        fs::write(shop.path(name), dng_as_told([12, 10], &strip, areas)).unwrap();
         String::from_utf8(shop.attempt(&format!("import-raw {name} -o out.exr"), &[]).stderr).unwrap()
     };
     let [white, active, masked]: [(u16, &[u32]); 3] =
         [(50717, &[4000]), (50829, &[0, 4, 10, 12]), (50830, &[0, 0, 10, 4])];
     assert!(said("masked.dng", &[white, active, masked]).contains("it has masked photosites and no BlackLevel"));
     assert_eq!(said("told.dng", &[(50714, &[256]), white, active, masked]), "");
-    assert_eq!(said("whole.dng", &[white]), "");
+    assert!(said("whole.dng", &[white]).contains("it has no BlackLevel, which by DNG is then 0; --metadata FILE"));
 }
 
 /// Masks beside the active rows alone tell no row above them, and a rectangle leaves those out.
@@ -439,12 +439,14 @@ fn a_dng_tells_the_read_out_that_made_it() {
     let white = metadata.white_level_adu.unwrap().largest();
     assert!((of("full_well_e") * expected / (white - of("bias_adu")) - 1.0).abs() < 1e-9);
     let noise = metadata.noise.as_ref().unwrap();
-    let dark = noise.dark_e + (noise.dark_e * readout.dcnu).powi(2);
-    // The pattern of the dark signal is cut off at zero, far out.
+    // DCNU multiplies the count of the dark signal, its shot noise too; its pattern is the same in all frames, and not told.
+    let dark = noise.dark_e * (1.0 + readout.dcnu.powi(2));
+    let pattern_e = noise.dark_e * readout.dcnu * readout.adu_per_e / expected;
     let variance = (readout.adu_per_e / expected).powi(2) * (readout.read_noise_e.powi(2) + dark);
     assert!((of("read_noise_e").powi(2) / variance - 1.0).abs() < 1e-3);
-    // By that the noise of the codes is told as by the sensor, once it has the pattern that the profile has no place for.
+    // By that the noise of the codes is told as by the sensor, once it has the patterns that the profile has no place for.
     told["readout"]["prnu"] = readout.prnu.into();
+    told["readout"]["dsnu_e"] = pattern_e.into();
     fs::write(shop.path("r.yaml"), serde_yaml::to_string(&told).unwrap()).unwrap();
     let codes = shop.frame("out.exr");
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "codes of 12 bits")]

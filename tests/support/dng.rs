@@ -2,15 +2,27 @@
 
 #![allow(dead_code, reason = "each file of tests takes what it needs")]
 
+const BLACK_LEVEL: u16 = 50714;
+
 /// The bytes of a DNG with one strip of so many bits a sample, stored with a compression, and tags of its own: numbers of 32
-/// bits each.
+/// bits each; black reads 0 where they do not say otherwise.
 pub fn dng(size: [u32; 2], bits: u32, compression: u32, strip: &[u8], more: &[(u16, &[u32])]) -> Vec<u8> {
-    written(size, bits, compression, strip, more, &[])
+    let has_black = more.iter().any(|(tag, _)| *tag == BLACK_LEVEL);
+    let black: &[(u16, &[u32])] = if has_black { &[] } else { &[(BLACK_LEVEL, &[0])] };
+    written(size, bits, compression, strip, &[more, black].concat(), &[])
+}
+
+/// The same of samples of 16 bits, with no level of black but that of the tags.
+pub fn dng_as_told(size: [u32; 2], strip: &[u8], more: &[(u16, &[u32])]) -> Vec<u8> {
+    written(size, 16, 1, strip, more, &[])
 }
 
 /// The same of samples of 16 bits, where the tags of colors and shares are ratios: numerators and divisors.
 pub fn dng_with_ratios(size: [u32; 2], strip: &[u8], more: &[(u16, &[u32])]) -> Vec<u8> {
-    written(size, 16, 1, strip, more, &[(50721, 10), (50722, 10), (50727, 5), (50728, 5), (50734, 5), (50935, 5)])
+    let has_black = more.iter().any(|(tag, _)| *tag == BLACK_LEVEL);
+    let black: &[(u16, &[u32])] = if has_black { &[] } else { &[(BLACK_LEVEL, &[0])] };
+    let ratios = [(50721, 10), (50722, 10), (50727, 5), (50728, 5), (50734, 5), (50935, 5)];
+    written(size, 16, 1, strip, &[more, black].concat(), &ratios)
 }
 
 fn written(

@@ -4,7 +4,7 @@ use crate::metadata::FrameHeader;
 use crate::propagation::drift;
 use crate::propagation::frame::{Predicted, Unpredictable};
 use crate::propagation::sampling::{Place, Sampling};
-use crate::propagation::{Equations, FramePrediction, SiteCovariance, of_frame};
+use crate::propagation::{Equations, FramePrediction, PixelMoments, SiteCovariance, of_frame};
 use nalgebra::Matrix3;
 
 /// Covariances of means of patches of a frame.
@@ -78,12 +78,13 @@ impl<'a> PatchMeans<'a> {
         if !(is_within(0) && is_within(1)) {
             return Err(BEYOND);
         }
+        let in_frame = |mixture: &PixelMoments| {
+            let do_rows_drift = mixture.site_covariance().drifts();
+            let place = Place { frame, origin: geometry.origin, corner, size }.canonical(do_rows_drift);
+            Sampling::of(&mixture.weights, &mixture.sites, &place).mean_covariance
+        };
         match self.prediction {
-            FramePrediction::Pixels(mixture) => {
-                let do_rows_drift = mixture.site_covariance().drifts();
-                let place = Place { frame, origin: geometry.origin, corner, size }.canonical(do_rows_drift);
-                Ok(Sampling::of(&mixture.weights, &mixture.sites, &place).mean_covariance)
-            }
+            FramePrediction::Pixels(mixture) => Ok(in_frame(mixture)),
             FramePrediction::Planes(_) => Ok(self.anywhere(size)),
             FramePrediction::Groups(_) | FramePrediction::Tapped(_) => {
                 let mut part = head.clone();
@@ -93,6 +94,8 @@ impl<'a> PatchMeans<'a> {
                 let prediction = of_frame(&part, self.equations)?;
                 match &prediction {
                     FramePrediction::Tapped(pixels) => Ok(pixels.sampling().mean_covariance),
+                    // Behind one amplifier, and so are all samples within reach.
+                    FramePrediction::Pixels(mixture) => Ok(in_frame(mixture)),
                     of_sites => Ok(PatchMeans { prediction: of_sites, ..*self }.anywhere(size)),
                 }
             }
@@ -155,6 +158,9 @@ mod tests {
         assert_near(of(TapLayout::LeftRight, [100, 100]), quiet);
         assert_near(of(TapLayout::LeftRight, [2000, 100]), loud);
         assert_near(of(TapLayout::TopBottom, [2000, 100]), quiet);
+        // In the corner as that of a sensor without others.
+        let corner = variances(&|readout| readout.read_noise_e = 20.0, Some([0, 0]), [1, 1]);
+        assert_near(variances(&halves(TapLayout::LeftRight), Some([0, 0]), [1, 1]), corner);
         // Red columns are read by the one, blue columns by the other, whether pixels are measured or made of neighbors.
         let [red, _, blue] = of(TapLayout::Columns, [100, 100]);
         assert_near([red, blue, 1.0], [quiet[0], loud[2], 1.0]);

@@ -67,7 +67,7 @@ pub fn start<A: CommandFactory + FromArgMatches>(
             return ended(program, show(|| std::io::stdout().write_all(text.as_bytes())));
         }
     }
-    if asks_for("list", &command) {
+    if asks_for("list_sensors", &command) {
         return ended(program, show(|| std::io::stdout().write_all(inventory::page(Kind::Sensors, &[]).as_bytes())));
     }
     let words = wildcards::expanded(std::env::args_os().skip(1), &command);

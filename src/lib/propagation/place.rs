@@ -18,6 +18,25 @@ pub struct Place {
 }
 
 impl Place {
+    /// The same rectangle in a larger frame: its first column and row on the sensor, its columns and rows; none where the frame does not lie
+    /// within it.
+    #[must_use]
+    pub fn within(self, [x, y, width, height]: [i64; 4]) -> Option<Self> {
+        let axis = |axis: usize, first: i64, length: i64| {
+            let before = usize::try_from(i64::from(self.origin[axis]) - first).ok()?;
+            let length = usize::try_from(length).ok()?;
+            let is_within = before.checked_add(self.frame[axis])? <= length;
+            is_within.then_some((i32::try_from(first).ok()?, before + self.corner[axis], length))
+        };
+        let [columns, rows] = [axis(0, x, width)?, axis(1, y, height)?];
+        Some(Self {
+            frame: [columns.2, rows.2],
+            origin: [columns.0, rows.0],
+            corner: [columns.1, rows.1],
+            size: self.size,
+        })
+    }
+
     /// A place of the same law near the corner of a small frame: only phases, size and edges within reach matter; and rows on the sensor, where
     /// these drift.
     #[must_use]

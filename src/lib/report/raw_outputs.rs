@@ -108,7 +108,7 @@ const DESCRIPTION: &str = "gain and noise that a raw file tells; full well is wh
 fn read_out(reader: &FrameReader) -> Result<String> {
     let raw = reader.header();
     let refuse = |what: &str| raw.refuse(format!("{what}; leave out --write-readout"));
-    let Some(profile) = reader.noise_profile() else {
+    let Some((profile, told_adu)) = reader.noise_profile() else {
         return Err(refuse("it tells no noise: that takes the NoiseProfile of a DNG (-v tells what is passed over)"));
     };
     let (black, white) = levels(raw)?;
@@ -118,7 +118,8 @@ fn read_out(reader: &FrameReader) -> Result<String> {
     if count > 1 && count != filters.len() {
         return Err(refuse(&format!("its NoiseProfile has {count} classes, and its filters {}", filters.len())));
     }
-    let class = |index| profile.read_out(index, white - black);
+    // It is of the range that the tags tell, as the metadata of ours may have another.
+    let class = |index| profile.read_out(index, told_adu.unwrap_or(white - black));
     let classes: Option<Vec<ClassReadOut>> = (0..filters.len()).map(class).collect();
     let classes = classes.ok_or_else(|| refuse("its NoiseProfile has a class without shot noise"))?;
     let sensor = Sensor {

@@ -164,8 +164,8 @@ fn doubt_of_lights(comparison: &Comparison<FrameReader>) -> Option<Note> {
     let is_far = (x - other_x).abs().max((y - other_y).abs()) > NEAR;
     (comparison.white().is_some() && is_far).then(|| {
         Note::Warning(format!(
-            "{}: its white has x {other_x:.4}, y {other_y:.4}, that of {} x {x:.4}, y {y:.4}: differences of their lights count as \
-             differences of colors; `to-xyz --adapt-to` brings both to one light, and --white names what both are seen under",
+            "{}: its white has x {other_x:.4}, y {other_y:.4}, that of {} x {x:.4}, y {y:.4}: both are seen under the latter unless --white \
+             names another, and where one was adapted to another light that counts as a difference of colors",
             second.name, first.name
         ))
     })

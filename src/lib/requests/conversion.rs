@@ -119,7 +119,6 @@ impl Conversion {
                 matrix
             }
         };
-        notes.extend(self.doubts(&matrix, frame));
         let matrix = match without_exposure(&matrix, frame) {
             Some((relative, note)) => {
                 notes.push(note);
@@ -127,6 +126,7 @@ impl Conversion {
             }
             None => matrix,
         };
+        notes.extend(self.doubts(&matrix, frame));
         let adapting = self.adapting(matrix.white_xy, &frame.name)?;
         let adaptation = adapting.map(|adapting| adapting.matrix()).transpose()?;
         let adapted = |rows| adaptation.map_or(rows, |by| rows_of(&(by * color::matrix(&rows))));

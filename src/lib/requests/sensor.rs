@@ -14,7 +14,7 @@ pub struct SensorRequest {
     #[arg(long, value_name = "NAME|FILE", default_value = data::DEFAULT_SENSOR)]
     pub sensor: String,
     /// List the sensors that are known by name, with what each has and lacks
-    #[arg(long)]
+    #[arg(id = "list_sensors", long = "list")]
     pub list: bool,
     /// Sensor whose read-out counts in place of the sensor's own
     #[arg(long, value_name = "NAME|FILE")]

@@ -19,6 +19,11 @@ pub struct Region {
     pub height: usize,
 }
 
+/// The plane that a frame was demosaicked from, column, row, columns and rows on the sensor, where it is told.
+fn mosaicked(frame: &FrameHeader) -> Option<[i64; 4]> {
+    frame.metadata.demosaic.as_ref()?.plane
+}
+
 impl Region {
     /// All of a frame.
     pub fn whole(frame: &FrameHeader) -> Self {
@@ -44,12 +49,17 @@ impl Region {
     /// A place of the same sampling law.
     pub(super) fn place(&self, frame: &FrameHeader) -> Place {
         let geometry = &frame.geometry;
-        let whole = Place {
+        let own = Place {
             frame: [geometry.width, geometry.height],
             origin: geometry.origin,
             corner: [self.x, self.y],
             size: [self.width, self.height],
         };
+        // A crop of demosaicked pixels has samples mirrored where the plane that they were made of ends.
+        let whole = mosaicked(frame)
+            .filter(|_| frame.geometry.channels.len() > 1)
+            .and_then(|plane| own.within(plane))
+            .unwrap_or(own);
         whole.canonical(frame.readout().is_ok_and(|readout| readout.black_drift_e > 0.0))
     }
 

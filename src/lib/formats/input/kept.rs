@@ -71,10 +71,12 @@ fn filtered_plane(stored: &Geometry) -> Option<&str> {
         let last = channel.rsplit('.').next().unwrap_or(channel);
         NAMES.iter().any(|name| last.eq_ignore_ascii_case(name))
     };
+    // Beside X it is luminance.
+    let are_stimuli = stored.channels.iter().any(|channel| channel.eq_ignore_ascii_case("x"));
     let mut found = stored.channels.iter().map(String::as_str).filter(is_plane);
     // A plane Y that leads, with layers behind it, is the frame whatever is wanted.
     let leads = stored.channels.first().is_some_and(|first| first == "Y");
-    found.next().filter(|_| !leads && stored.channels.len() > 1 && found.next().is_none())
+    found.next().filter(|_| !(leads || are_stimuli) && stored.channels.len() > 1 && found.next().is_none())
 }
 
 /// The unit of one channel, or of its standard deviation, of a frame whose channels may have one each.
@@ -103,6 +105,11 @@ pub(super) fn cut_to(
     let beyond = picture.filter(|(_, [x, y, width, height])| {
         kept[0] < *x || kept[1] < *y || kept[2] > x + width || kept[3] > y + height
     });
+    // Where pixels were mirrored is where the plane ended, not where the crop does.
+    let on_sensor = header.geometry.on_sensor();
+    if let Some(record) = header.metadata.demosaic.as_mut().filter(|_| crop.is_some()) {
+        record.plane.get_or_insert(on_sensor);
+    }
     let corner = crop.map_or(Ok([0, 0]), |crop| cut(header, crop))?;
     if let Some((tag, [x, y, width, height])) = beyond {
         register::doubt(format!(

@@ -343,8 +343,9 @@ impl FrameReader {
     }
 
     /// The noise of the samples, where the file tells it.
-    pub fn noise_profile(&self) -> Option<&NoiseProfile> {
-        self.reader.noise_profile()
+    pub fn noise_profile(&self) -> Option<(&NoiseProfile, Option<f64>)> {
+        let told = self.reader.own_tags().noise_profile.as_ref();
+        Some((self.reader.noise_profile()?, told.map(|told| told.range_adu)))
     }
 
     /// The warning that its metadata describe other samples; of the right size, none before the rows are in that they tell.

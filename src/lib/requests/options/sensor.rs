@@ -17,7 +17,7 @@ pub struct SensorChoice {
     #[arg(long, value_name = "NAME|FILE")]
     pub sensor: Option<String>,
     /// List the sensors that are known by name, with what each has and lacks
-    #[arg(long)]
+    #[arg(id = "list_sensors", long = "list")]
     pub list: bool,
     /// Sensor whose read-out counts in place of that of the frame's sensor, or of --sensor
     #[arg(long, value_name = "NAME|FILE")]
