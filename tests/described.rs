@@ -173,6 +173,32 @@ fn colors_of_an_unknown_exposure_are_relative() {
     }
 }
 
+/// The pixels of a crop were mirrored where their plane ends, as those of a region of it.
+#[test]
+fn a_crop_of_pixels_is_predicted_as_the_region_that_it_is() {
+    let shop = Workshop::new();
+    shop.pipe("render-radiance --electrons 3000,5000,2000 --size 60x44 | mosaic | add-noise | digitize | demosaic --method bi -o f.exr");
+    shop.run("to-xyz f.exr --matrix sensor -o x.exr", &[]);
+    shop.run("to-xyz f.exr --matrix sensor --crop 13,9,9,7 -o cropped.exr", &[]);
+    for lines in [
+        ["measure f.exr --region 13,9,9,7", "measure f.exr --crop 13,9,9,7"],
+        ["measure x.exr --region 13,9,9,7", "measure cropped.exr"],
+        ["measure x.exr --region 0,30,9,14", "measure x.exr --crop 0,30,9,14"],
+    ] {
+        let [region, crop] = lines.map(|line| {
+            let report = shop.run(&format!("{line} --output-format json"), &[]);
+            let report: serde_json::Value = serde_json::from_slice(&report).unwrap();
+            report["regions"][0]["channels"].clone()
+        });
+        for (region, crop) in region.as_array().unwrap().iter().zip(crop.as_array().unwrap()) {
+            for key in ["std", "predicted_std", "mean_error", "std_error"] {
+                let [region, crop] = [region, crop].map(|channel| channel[key].as_f64().unwrap());
+                assert!((region / crop - 1.0).abs() < 1e-6, "{lines:?} {key}: {region} {crop}");
+            }
+        }
+    }
+}
+
 /// One channel of frames of three planes is measured as a camera without filters.
 #[test]
 fn a_channel_of_flats_is_measured_alone() {
