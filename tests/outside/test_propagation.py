@@ -135,7 +135,7 @@ class Prediction(ProgramCase):
                     variance = np.sum(total**2 * np.asarray(codes)[classes], axis=(1, 2))
                     stages, _ = self.predict(
                         electrons, "--method", method, "--pattern", "grbg", "--patch", f"{width}x{height}",
-                        "--patch-at", f"{column},{row}",
+                        "--patch-at", f"{column + 20},{row + 20}",
                     )
                     self.close(stages["demosaicked"]["patch_mean_std"], np.sqrt(variance), 1e-6, f"{method} {width}")
                     found.append(variance)
@@ -192,7 +192,7 @@ class Prediction(ProgramCase):
                 expected = total @ covariance @ total.T
                 stages, _ = self.predict(
                     electrons, "--sensor", sensor, "--method", method, "--patch", f"{width}x{height}",
-                    "--patch-at", f"{column},{row}",
+                    "--patch-at", f"{column + 20},{row + 20}",
                 )
                 stage = stages["demosaicked"]
                 self.close(stage["patch_mean_covariance"], expected, 1e-6, f"{method} {width}x{height}")

@@ -168,7 +168,7 @@ class Relative(ProgramCase):
         for more, words in (
             ({50728: None}, "nothing tells the white of the exposure"),
             ({52531: signed(WARM)}, "a third illuminant (ColorMatrix3)"),
-            ({50710: (1, [2, 1, 0])}, "its classes are others than R, G and B"),
+            ({50710: (1, [0, 1, 2, 3])}, "its classes are others than R, G and B"),
             ({50728: ratios([0.0, 1.0, 1.0])}, "AsShotNeutral has a number that is not above 0"),
             ({50721: signed(np.ones((3, 3)))}, "singular"),
             ({50721: signed(COLD[:2])}, "its tag ColorMatrix1 has 6 of 9 numbers"),
