@@ -5,7 +5,7 @@
 //!
 //! What photosites share by rows adds Σ_r Σ_kl A_rk A′_rl R_kl, A_rk the sum of the weights on the sites of class k in row r and R
 //! their covariance ([`SiteCovariance`]); so do columns. A drift of the black level is shared by rows that are near too: over its places
-//! ([`super::row_drift`]).
+//! (`row_drift`).
 
 use super::covariance::PAIRS;
 use super::moments::SiteCovariance;
