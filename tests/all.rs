@@ -9,6 +9,7 @@ mod checks;
 mod cmos;
 mod color;
 mod corpus;
+mod corrected_transfer;
 mod correction;
 mod corrections;
 mod described;

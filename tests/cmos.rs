@@ -7,7 +7,7 @@ use crate::support::chain::{colored, demosaicked, digitized, less_darks, noisy, 
 use crate::support::cmos::{SEEDS, regions, scene};
 use crate::support::misses::trials;
 use crate::support::{assert_same, at, crop, expected, through, through_cuts};
-use cyanometer::analysis::statistics::Region;
+use cyanometer::analysis::statistics::{Region, Saturated, measure};
 use cyanometer::cfa::CfaPattern;
 use cyanometer::color::Space;
 use cyanometer::metadata::Scene;
@@ -262,4 +262,35 @@ fn what_rows_share_is_not_left_out() {
         // 40 rows and 60 columns instead of 2400 pixels.
         assert!(shared > 1.5 * alone, "{shared} {alone}");
     }
+}
+
+/// Noise of rows that is said to be noise of photosites leaves the variance of a frame as it is, and so of columns; means of rows and of
+/// columns show it, before demosaicking.
+#[test]
+fn noise_of_rows_and_columns_is_not_that_of_photosites() {
+    let light = scene([160, 120], [900.0, 2000.0, 1500.0]);
+    let planes = digitized(&noisy(&light, &NoiseSettings { seed: 11, sensor_seed: 12, ..Default::default() }));
+    let plane = plane_of(&planes);
+    for frame in [&planes, &plane] {
+        assert!(is_as_predicted(frame));
+        for (what, lie) in [
+            (
+                "rows",
+                (|readout| readout.read_noise_e = readout.read_noise_e.hypot(std::mem::take(&mut readout.row_noise_e)))
+                    as Lie,
+            ),
+            ("columns", |readout| readout.dsnu_e = readout.dsnu_e.hypot(std::mem::take(&mut readout.dsnu_column_e))),
+        ] {
+            let mut said = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+            with_readout(&mut said, lie);
+            assert!(!is_as_predicted(&said), "{what} of {} channels", said.header.geometry.channels.len());
+        }
+    }
+}
+
+type Lie = fn(&mut cyanometer::camera::readout::ReadOut);
+
+fn is_as_predicted(frame: &MemoryFrame) -> bool {
+    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+    measure(&mut source, &[], Saturated::Kept, Equations::Exact, Some(1e-4)).unwrap().check.unwrap().passed
 }

@@ -2,7 +2,7 @@
 
 use super::misses::CONFIDENCE;
 use cyanometer::analysis::photon_transfer::{
-    Asked, ClassFindings, Condition, Level, Settings, Site, full_mean, of_class, survey, survey_as,
+    Asked, ClassFindings, Condition, Corrected, Ends, Level, Settings, Site, full_mean, of_class, survey, survey_as,
 };
 use cyanometer::camera::optics::Exposure;
 use cyanometer::camera::readout::ReadOut;
@@ -166,7 +166,9 @@ pub fn level_in(
         .collect();
     let top = f64::from((1_u32 << readout.bits) - 1);
     let sites = Site::of(&taken[0].header);
-    let found = survey_as(&mut taken, &Asked { top: Some(top), full, ..Asked::default() }).unwrap();
+    let found =
+        survey_as(&mut taken, &Asked { ends: Ends { top: Some(top), ..Ends::default() }, full, ..Asked::default() })
+            .unwrap();
     let green = sites.iter().zip(found.sites).filter(|(site, _)| site.class == "G");
     Level::of(0, condition, green.map(|(_, survey)| survey).collect())
 }
@@ -180,7 +182,7 @@ pub fn measured(readout: &ReadOut, index: u32) -> ClassFindings {
 }
 
 pub fn settings() -> Settings {
-    Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top: None }
+    Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top: None, corrected: Corrected::default() }
 }
 
 pub fn found(flats: &[Level], darks: &[Level]) -> ClassFindings {

@@ -5,6 +5,7 @@ use super::format::SampleType;
 use super::input::{FrameReader, InputOptions};
 use crate::error::Result;
 use crate::metadata::FrameHeader;
+use crate::stages::saturation::with_mask;
 use crate::stream::RowSource;
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 
@@ -23,6 +24,8 @@ pub struct OneOfMany {
     options: InputOptions,
     rows_read: usize,
     stays_open: bool,
+    has_mask: bool,
+    keeps_mask: bool,
 }
 
 /// How many files may be open besides [`OTHERS`], once the limit is raised as far as it goes.
@@ -47,6 +50,8 @@ impl OneOfMany {
             let stays_open = is_stream || (index as u64) < room;
             Ok(Self {
                 header: reader.header().clone(),
+                has_mask: reader.has_mask(),
+                keeps_mask: false,
                 natural_rows: reader.natural_rows(),
                 may_wait: reader.may_wait(),
                 notes: reader.notes().to_vec(),
@@ -63,6 +68,17 @@ impl OneOfMany {
     /// Its head, to which what a user says of it may be added.
     pub fn header_mut(&mut self) -> &mut FrameHeader {
         &mut self.header
+    }
+
+    /// Gives the layer of marks as the last channel from now on, where there is one.
+    pub fn keep_mask(&mut self) {
+        if self.has_mask && !self.keeps_mask {
+            self.keeps_mask = true;
+            self.header = with_mask(self.header.clone());
+            if let Some(reader) = &mut self.reader {
+                reader.keep_mask();
+            }
+        }
     }
 
     /// The type of its stored samples; none where channels differ in it.
@@ -94,6 +110,9 @@ impl RowSource for OneOfMany {
             Some(reader) => reader,
             None => {
                 let mut reader = FrameReader::open(&self.options)?;
+                if self.keeps_mask {
+                    reader.keep_mask();
+                }
                 let mut passed = Vec::new();
                 let step = self.natural_rows.max(1);
                 let mut left = self.rows_read;

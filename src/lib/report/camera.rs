@@ -134,6 +134,7 @@ fn document(camera: &MeasuredCamera) -> Value {
         "frames": {"flats": camera.frames[0], "darks": camera.frames[1]},
         "temperature_k": camera.temperature_k,
         "confidence": camera.confidence,
+        "corrected": camera.corrected,
         "channels": channels,
     })
 }
@@ -191,8 +192,9 @@ fn heading(camera: &MeasuredCamera) -> String {
     let [width, height] = [camera.head.geometry.width, camera.head.geometry.height];
     let percent = in_digits(camera.confidence * 100.0, 3);
     let percent = percent.trim_end_matches('0').trim_end_matches('.');
+    let corrected = camera.corrected.as_ref().map_or(String::new(), |how| format!("; {how}"));
     format!(
-        "{}: {} of {width}x{height}{at}; intervals hold with {percent} %",
+        "{}: {} of {width}x{height}{at}; intervals hold with {percent} %{corrected}",
         camera.list,
         frames_in_words(camera.frames)
     )

@@ -1,6 +1,6 @@
 //! A measured camera as a sensor file, with what each number is from.
 
-use crate::analysis::photon_transfer::{ClassFindings, HotTail};
+use crate::analysis::photon_transfer::{ClassFindings, HotTail, RowDrift};
 use crate::camera::readout::{MOST_DCNU, ReadOut};
 use crate::camera::sensor::{Origin, Provenance, SENSOR_SCHEMA, Sensor};
 use crate::cfa::FilterArray;
@@ -57,13 +57,17 @@ impl Told {
 ///
 /// # Errors
 ///
-/// [`Error::Data`] where there is no gain or black level, and for frames of electrons, which tell nothing of a converter.
+/// [`Error::Data`] where there is no gain or black level, and for frames that were corrected, or of electrons, which tell nothing of a
+/// converter.
 #[allow(clippy::too_many_lines, reason = "key after key, as a sensor file has them")]
 pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     let metadata = &camera.head.metadata;
     let lacking = |what: &str| Error::Data(format!("{}: no sensor file follows: {what}", camera.list));
     if metadata.quantity == QuantityKind::Electrons {
         return Err(lacking("the frames are of electrons, before any converter"));
+    }
+    if metadata.correction.is_some() || metadata.adc.is_some_and(|adc| adc.is_linearized) {
+        return Err(lacking("the frames were corrected, and a sensor file is of what the camera gives"));
     }
     let said = metadata
         .white_level_adu
@@ -119,7 +123,9 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         found
     });
     let dark_noise = needed("dark_noise_e")?;
-    let read_noise_e = (dark_noise.value.powi(2) - row_noise_e.powi(2) - column_noise_e.powi(2)).max(0.0).sqrt();
+    let [black_drift_e, black_drift_rows] = drift_of(camera, &mut told);
+    let of_lines = row_noise_e.powi(2) + column_noise_e.powi(2) + black_drift_e.powi(2);
+    let read_noise_e = (dark_noise.value.powi(2) - of_lines).max(0.0).sqrt();
     told.tell(
         "read_noise_e",
         Origin::Derived,
@@ -154,8 +160,8 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
         read_noise_e,
         row_noise_e,
         column_noise_e,
-        black_drift_e: 0.0,
-        black_drift_rows: 0.0,
+        black_drift_e,
+        black_drift_rows,
         dsnu_e,
         dsnu_row_e,
         dsnu_column_e,
@@ -332,6 +338,20 @@ fn pooled_of(classes: &[ClassFindings], key: &str, of_all: bool) -> Option<Inter
 fn reason(classes: &[ClassFindings], key: &str) -> String {
     let of = |class: &ClassFindings| class.findings.iter().find(|finding| finding.key == key)?.found.clone().err();
     classes.iter().find_map(of).unwrap_or_else(|| "it was not measured".into())
+}
+
+/// The drift of the black level, rms in e-, and rows of the sensor from one knot to the next: 0 where none is told.
+fn drift_of(camera: &MeasuredCamera, told: &mut Told) -> [f64; 2] {
+    let found: Vec<RowDrift> = camera.classes.iter().filter_map(|class| class.drift).collect();
+    let mean = |of: fn(&RowDrift) -> f64| found.iter().map(of).sum::<f64>() / found.len() as f64;
+    if found.is_empty() {
+        return [0.0; 2];
+    }
+    ["black_drift_e", "black_drift_rows"]
+        .map(|key| told.tell(key, Origin::Derived, "by how means of rows of darks differ, over the rows between them"));
+    let is_array = camera.head.geometry.channels.len() == 1;
+    let period = camera.head.metadata.cfa.filter(|_| is_array).map_or(1, |array| array.period()[1]);
+    [mean(|drift| drift.variance).sqrt(), (mean(|drift| drift.rows_per_knot) * period as f64).max(2.0)]
 }
 
 fn shown(interval: Interval) -> String {

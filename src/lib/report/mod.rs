@@ -397,6 +397,8 @@ fn tests_text(tests: &[Test], out: &mut String) {
         Subject::Mean => "mean".to_owned(),
         Subject::Variance => "variance".to_owned(),
         Subject::Correlation => "correlation".to_owned(),
+        Subject::VarianceOfRowMeans => "variance of row means".to_owned(),
+        Subject::VarianceOfColumnMeans => "variance of column means".to_owned(),
         Subject::Deviation => "deviation".to_owned(),
         Subject::VarianceOfMeans => "variance of means".to_owned(),
         Subject::CorrelationOfMeans => "correlation of means".to_owned(),

@@ -6,9 +6,10 @@ use super::doubts::doubts;
 use super::level::{Level, is_same_time};
 use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
-use super::pattern::{Part, fixed, of_light, temporal, with_hidden};
-use super::reasons::{NO_NOISE, Reasons, of_gain, time_of_noise};
+use super::pattern::{Part, drift_of, fixed, of_light, temporal, with_hidden};
+use super::reasons::{LOST_DARK, NO_NOISE, Reasons, of_gain, time_of_noise};
 use super::rounding::{Steps, least_normal};
+use super::row_drift::RowDrift;
 use super::scatter::Scatter;
 use super::settings::Settings;
 use super::sheet::{ClassFindings, CurvePoint, DarkPoint, Found, finding, over};
@@ -92,6 +93,7 @@ pub fn of_class(
         let told = quietest.filter(|_| curve.tells_dark_noise()).map(of_part);
         add(key, over_gain(told.ok_or_else(|| reasons.of_noise())));
     }
+    let drift = drift_of(&repeated).zip(gain.as_ref().ok()).map(|(drift, gain)| drift.in_electrons(gain.value));
     // The signal that equals its noise: ½ + √(¼ + σ²) [EMVA1288, Eq. 25].
     let noise_square = |v: &Values| Some(v.dark_variance? / (v.gain * v.gain));
     let threshold = |square: f64| 0.5 + (0.25 + square.max(0.0)).sqrt();
@@ -132,11 +134,13 @@ pub fn of_class(
         _ => current,
     };
     let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
-    add("dark_current_e_per_s", number(&per_second, reasons.of_times()).map(sampled));
+    // What darks took off the frames they do not show.
+    let kept = |found: Found| if settings.corrected.lost_dark { Err(LOST_DARK.into()) } else { found };
+    add("dark_current_e_per_s", kept(number(&per_second, reasons.of_times()).map(sampled)));
     let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
     let why = if curve.is_silent { reasons.of_noise() } else { reasons.of_times() };
     add("dark_current_from_variance_e_per_s", number(&from_variance, why).map(sampled));
-    add("dark_current_doubling_k", doubling_temperature(all_darks, &scatter, rounding, confidence));
+    add("dark_current_doubling_k", kept(doubling_temperature(all_darks, &scatter, rounding, confidence)));
     let offset = parted.clone().map(|[offset, _]| offset);
     add("dsnu_offset_e", over_gain(offset));
     let slope = curve.interval(|values| values.dark_slope, confidence).filter(|slope| slope.low > 0.0);
@@ -146,7 +150,7 @@ pub fn of_class(
         )?;
         Ok(over(square.root(), slope))
     });
-    add("dcnu", uneven);
+    add("dcnu", kept(uneven));
     let points = given.iter().enumerate().map(|(place, flat)| {
         CurvePoint::of(flat, [curve.signal(place), curve.noise(place)], curve.fitted().contains(&place))
     });
@@ -155,6 +159,12 @@ pub fn of_class(
     }
     let (curve_points, values) = (points.collect(), curve.values());
     let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames), &limit);
+    notes.extend(drift.map(|RowDrift { variance, .. }| {
+        format!(
+            "the black level drifts along rows, by {} e- rms: that is in temporal dark noise, and not in that of rows",
+            in_digits(variance.sqrt(), 2)
+        )
+    }));
     if is_left_out {
         let times = if clipped == 1 { "one exposure time".to_owned() } else { format!("{clipped} exposure times") };
         notes.push(format!(
@@ -190,6 +200,7 @@ pub fn of_class(
         stuck: Vec::new(),
         early: Vec::new(),
         hot: None,
+        drift,
     }
 }
 

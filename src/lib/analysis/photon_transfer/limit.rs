@@ -3,7 +3,7 @@
 use super::curve::{Curve, LEAST_VARIANCE, may_be_largest};
 use super::level::Level;
 use super::reasons::{CLIPPED, Reasons};
-use super::settings::Settings;
+use super::settings::{Corrected, Settings};
 use super::sheet::{Found, over};
 use crate::numerics::variance_components::Interval;
 
@@ -25,6 +25,8 @@ enum What {
     Photosites,
     /// Of so many codes, one or the other.
     Either(f64),
+    /// One or the other, as marks of saturated samples do not tell which.
+    Marked,
     Nothing,
 }
 
@@ -47,8 +49,14 @@ impl Limit {
             );
             return named("saturation capacity, of the converter", Some(told), What::Converter(top), is_reached);
         }
+        if settings.corrected.is_marked && last.at_ends[0] > MANY {
+            let told = "saturation is that of samples which are marked as saturated; whether photosites or the converter end there, frames as \
+                        the camera gives them would tell";
+            return named("saturation capacity, of either", Some(told.to_owned()), What::Marked, is_reached);
+        }
         // Noise of the read-out is left where photosites are full, and none where the converter is.
-        let is_one_code = settings.are_codes && settings.top.is_none() && last.variance < LEAST_VARIANCE;
+        let is_raw = settings.corrected == Corrected::default();
+        let is_one_code = settings.are_codes && is_raw && settings.top.is_none() && last.variance < LEAST_VARIANCE;
         if is_one_code {
             let told = format!(
                 "whether photosites or the converter end at {:.1} ADU is not known: the largest code, given by --white, would tell",
@@ -107,6 +115,10 @@ impl Limit {
             What::Either(mean) => Err(format!(
                 "photosites or the converter end at {mean:.1} ADU: it is no less than {reached_e:.0} e-, and the largest code, given by \
                  --white, would tell which"
+            )),
+            What::Marked => Err(format!(
+                "photosites or the converter end where samples are marked as saturated: it is no less than {reached_e:.0} e-, and frames as \
+                 the camera gives them would tell which"
             )),
             What::Photosites if self.is_reached => Ok(()),
             _ => Err("no flat is so bright that every photosite is full: flats of more light would tell".into()),

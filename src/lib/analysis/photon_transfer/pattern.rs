@@ -5,6 +5,8 @@
 
 use super::level::Level;
 use super::rounding::Hidden;
+use super::row_drift::{RowDrift, RowScatter, are_smooth, drift_among};
+use super::tally::SiteSurvey;
 use crate::numerics::variance_components::{Interval, MeanSquare, MeanSquares, combination};
 
 /// A part of a variance between photosites.
@@ -104,18 +106,33 @@ pub fn left_in_mean(level: &Level) -> [[f64; 2]; 2] {
     /// That of a standard deviation to both sides.
     const ONE: f64 = 0.682_689_492_137_085_9;
     [Part::Column, Part::Row].map(|part| {
-        let Interval { value, low, high } = temporal(&[level], part, ONE);
+        let Interval { value, low, high } = temporal_of(&[level], part, ONE, |site| site.temporal);
         [value.max(0.0), (high - low) / 2.0].map(|of| of / level.frames as f64)
     })
 }
 
-/// Variance that a part of the temporal noise has, over several levels that have it alike.
+/// Variance that a part of the temporal noise has, over several levels that have it alike; of rows without what drifts along them.
 pub fn temporal(levels: &[&Level], part: Part, confidence: f64) -> Interval {
+    let without_drift = |site: &SiteSurvey| MeanSquares { rows: site.row_scatter.mean_square_apart(), ..site.temporal };
+    let is_apart = part == Part::Row && are_smooth(&row_scatters(levels));
+    temporal_of(levels, part, confidence, if is_apart { without_drift } else { |site| site.temporal })
+}
+
+/// The drift of the black level along rows over several levels that have it alike, in samples²; none where none is told.
+pub fn drift_of(levels: &[&Level]) -> Option<RowDrift> {
+    drift_among(&row_scatters(levels))
+}
+
+fn row_scatters(levels: &[&Level]) -> Vec<RowScatter> {
+    levels.iter().flat_map(|level| &level.sites).map(|site| site.row_scatter).collect()
+}
+
+fn temporal_of(levels: &[&Level], part: Part, confidence: f64, of: fn(&SiteSurvey) -> MeanSquares) -> Interval {
     let weight = |level: &Level| level.frames as f64 - 1.0;
     let all: f64 = levels.iter().map(|level| weight(level)).sum();
     let of_level = |level: &&Level| {
         let (level, share) = (*level, weight(level) / all);
-        terms(level, part, move |index| (level.sites[index].temporal, level.sites[index].size), share)
+        terms(level, part, move |index| (of(&level.sites[index]), level.sites[index].size), share)
     };
     combination(&levels.iter().flat_map(of_level).collect::<Vec<_>>(), confidence)
 }

@@ -15,6 +15,10 @@ const UNSATURATED: &str = "the variance still rises at the brightest flat: brigh
 /// Of what frames without any noise do not tell.
 pub const NO_NOISE: &str = "the frames show none at all, not even noise: it takes frames as a camera gives them";
 
+/// Of frames that were corrected by darks, or by black beside the image.
+pub const LOST_DARK: &str =
+    "what dark charge adds on average came off the frames: it takes darks as the camera gives them";
+
 /// What is said of dark noise that is not that of no exposure time but of such a one.
 pub fn time_of_noise(time_s: Option<f64>) -> String {
     let of = time_s.map_or("the exposure time of the darks, which is not known".to_owned(), |time| format!("{time} s"));

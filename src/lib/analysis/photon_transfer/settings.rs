@@ -14,6 +14,32 @@ pub struct Settings {
     pub are_codes: bool,
     /// The largest code, where it is known.
     pub top: Option<f64>,
+    /// What was done to the samples before.
+    pub corrected: Corrected,
+}
+
+/// What was done to samples before they are measured, beyond a level that comes back.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Corrected {
+    /// Whether marks beside the samples, and not their levels, tell which are saturated.
+    pub is_marked: bool,
+    /// Whether what dark charge adds on average came off.
+    pub lost_dark: bool,
+}
+
+/// Samples at which codes end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ends {
+    /// The least; none where what came off samples hides which were that.
+    pub bottom: Option<f64>,
+    /// The largest, where it is known by its level.
+    pub top: Option<f64>,
+}
+
+impl Default for Ends {
+    fn default() -> Self {
+        Self { bottom: Some(0.0), top: None }
+    }
 }
 
 impl Settings {

@@ -4,6 +4,7 @@ use super::curve::Values;
 use super::hot::HotTail;
 use super::level::Level;
 use super::linearity::Linearity;
+use super::row_drift::RowDrift;
 use super::stuck::StuckSite;
 use super::suspects::Suspect;
 use crate::numerics::variance_components::Interval;
@@ -106,6 +107,8 @@ pub struct ClassFindings {
     pub early: Vec<[usize; 2]>,
     /// Hot photosites apart from all others, where there are some.
     pub hot: Option<HotTail>,
+    /// The drift of the black level along the rows of its grids, in e-², where there is one.
+    pub drift: Option<RowDrift>,
 }
 
 impl ClassFindings {

@@ -53,6 +53,8 @@ struct Grid {
     sites: Vec<(StandIn, StuckSite)>,
     /// Those that reach the largest code early, and their places in the frame.
     early: Vec<(StandIn, [usize; 2])>,
+    /// Those that corrections mended.
+    mended: Vec<StandIn>,
     class: String,
     count: usize,
 }
@@ -70,14 +72,15 @@ impl Stuck {
     pub fn of(sites: &[Site], size: [usize; 2], [dark, flat]: [&Picture; 2], are_codes: bool) -> Self {
         let grid = |(index, site): (usize, &Site)| {
             let sites = stuck_of(site, size, [dark, flat], index, are_codes);
-            Grid { sites, early: Vec::new(), class: site.class.clone(), count: site.count() }
+            Grid { sites, class: site.class.clone(), count: site.count(), ..Grid::default() }
         };
         Self { grids: sites.iter().enumerate().map(grid).collect() }
     }
 
-    /// The same with those besides that reach the largest code early: columns and rows of each grid, row by row.
+    /// The same with those besides that reach the largest code early, and those that corrections mended: columns and rows of each grid,
+    /// row by row.
     #[must_use]
-    pub fn with_early(self, sites: &[Site], early: &[Vec<[usize; 2]>]) -> Self {
+    pub fn with_others(self, sites: &[Site], early: &[Vec<[usize; 2]>], mended: &[Vec<[usize; 2]>]) -> Self {
         let grid = |(index, site): (usize, &Site)| {
             let mut grid = self.grids.get(index).cloned().unwrap_or_default();
             (grid.class, grid.count) = (site.class.clone(), site.count());
@@ -85,14 +88,17 @@ impl Stuck {
                 grid.sites.iter().any(|(stuck, _)| stuck.row == *row && stuck.column == *column)
             };
             let places: Vec<[usize; 2]> = early[index].iter().filter(|place| !is_known(place)).copied().collect();
+            let is_other = |place: &&[usize; 2]| !is_known(place) && !places.contains(place);
+            let own_mended: Vec<[usize; 2]> = mended[index].iter().filter(is_other).copied().collect();
             let mut out: Vec<[usize; 2]> = grid.sites.iter().map(|(stuck, _)| [stuck.column, stuck.row]).collect();
-            out.extend(&places);
+            out.extend(places.iter().chain(&own_mended));
             let with_stand_in = |&[column, row]: &[usize; 2]| {
                 let own: Vec<usize> = out.iter().filter(|place| place[1] == row).map(|place| place[0]).collect();
                 let at = [site.first[0] + column * site.step[0], site.first[1] + row * site.step[1]];
                 Some((StandIn { row, column, by: nearest_other(column, site.size[0], &own)? }, at))
             };
             grid.early = places.iter().filter_map(with_stand_in).collect();
+            grid.mended = own_mended.iter().filter_map(with_stand_in).map(|(stand_in, _)| stand_in).collect();
             // One that stood in may be such a one itself.
             for (stuck, _) in &mut grid.sites {
                 let own: Vec<usize> = out.iter().filter(|place| place[1] == stuck.row).map(|place| place[0]).collect();
@@ -105,7 +111,7 @@ impl Stuck {
 
     /// Whether there are any.
     pub fn is_any(&self) -> bool {
-        self.grids.iter().any(|grid| !grid.sites.is_empty() || !grid.early.is_empty())
+        self.grids.iter().any(|grid| !(grid.sites.is_empty() && grid.early.is_empty() && grid.mended.is_empty()))
     }
 
     /// The share of the photosites of a class that hold one value.
@@ -130,6 +136,9 @@ impl Stuck {
             if self.share_of(&grid.class, |grid| grid.early.len()) > FEW {
                 own.early.clear();
             }
+            if self.share_of(&grid.class, |grid| grid.mended.len()) > FEW {
+                own.mended.clear();
+            }
             own
         };
         Self { grids: self.grids.iter().map(of_few).collect() }
@@ -140,7 +149,7 @@ impl Stuck {
         let Some(grid) = self.grids.get(grid) else { return Vec::new() };
         let both =
             grid.sites.iter().map(|(stand_in, _)| *stand_in).chain(grid.early.iter().map(|(stand_in, _)| *stand_in));
-        let mut all: Vec<StandIn> = both.collect();
+        let mut all: Vec<StandIn> = both.chain(grid.mended.iter().copied()).collect();
         all.sort_by_key(|stand_in| (stand_in.row, stand_in.column));
         all
     }
@@ -151,6 +160,11 @@ impl Stuck {
         let mut found: Vec<[usize; 2]> = own.flat_map(|grid| grid.early.iter().map(|(_, at)| *at)).collect();
         found.sort_by_key(|[x, y]| (*y, *x));
         found
+    }
+
+    /// How many of a class corrections mended.
+    pub fn mended_of_class(&self, class: &str) -> usize {
+        self.grids.iter().filter(|grid| grid.class == class).map(|grid| grid.mended.len()).sum()
     }
 
     /// Those of a class, row by row.
@@ -242,11 +256,12 @@ mod tests {
         let by: Vec<usize> = found.stand_ins(0).iter().map(|stuck| stuck.by).collect();
         assert_eq!(by, [2, 2, 2]);
         assert!(found.is_any() && !found.few().is_any(), "3 of 48 are more than few");
-        // Those that reach the largest code early, one of which stood in for another, are left out with them.
-        let with = found.clone().with_early(std::slice::from_ref(&site), &[vec![[2, 0], [3, 0], [5, 4]]]);
+        // Those that reach the largest code early, or were mended, some of which stood in for others, are left out with them.
+        let with =
+            found.clone().with_others(std::slice::from_ref(&site), &[vec![[2, 0], [3, 0], [5, 4]]], &[vec![[4, 0]]]);
         assert_eq!(with.early_of_class("Y"), [[2, 0], [5, 4]]);
         let by: Vec<[usize; 3]> = with.stand_ins(0).iter().map(|stuck| [stuck.row, stuck.column, stuck.by]).collect();
-        assert_eq!(by, [[0, 2, 1], [0, 3, 4], [1, 0, 2], [1, 1, 2], [4, 5, 4]]);
+        assert_eq!(by, [[0, 2, 1], [0, 3, 1], [0, 4, 5], [1, 0, 2], [1, 1, 2], [4, 5, 4]]);
         // Of light that is not told from noise none is known.
         let dim = Picture { means: dark.means, noise: vec![1.0] };
         assert!(!Stuck::of(&[site], [8, 1], [&dark, &dim], true).is_any());

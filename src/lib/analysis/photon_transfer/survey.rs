@@ -11,12 +11,15 @@
 //! correlated: what σ² and m scatter by is told from the scatter of rows and of columns beside that of photosites, clustered both
 //! ways \[CameronEtAl2011].
 
+use super::marks::{is_marked, split_off, without_marks};
 use super::prints::{Print, Prints};
+use super::settings::Ends;
 use super::sites::Site;
 use super::stuck::Stuck;
 use super::tally::{SiteSurvey, Tally};
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
+use crate::metadata::FrameHeader;
 use crate::stream::RowSource;
 use rayon::prelude::*;
 
@@ -40,8 +43,8 @@ pub struct Survey {
 /// How frames are surveyed.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Asked<'a> {
-    /// The largest code, where it is known.
-    pub top: Option<f64>,
+    /// Where codes end.
+    pub ends: Ends,
     /// The mean from which on a photosite counts as full, where it is known.
     pub full: Option<f64>,
     /// Photosites that are left out.
@@ -57,60 +60,127 @@ pub struct Asked<'a> {
 ///
 /// Those of the frames; [`Error::Data`] for samples that are not finite, and for grids of fewer than 2x2.
 pub fn survey<S: RowSource>(frames: &mut [S], top: Option<f64>, keeps: bool) -> Result<Survey> {
-    survey_as(frames, &Asked { top, keeps, ..Asked::default() })
+    survey_as(frames, &Asked { ends: Ends { top, ..Ends::default() }, keeps, ..Asked::default() })
 }
 
-/// The same, as it is asked.
+/// The same, as it is asked. Where a frame has the layer of marks behind its channels, samples that these call saturated are at the top,
+/// whatever they are.
 ///
 /// # Errors
 ///
 /// As [`survey`].
 pub fn survey_as<S: RowSource>(frames: &mut [S], asked: &Asked) -> Result<Survey> {
-    let Asked { top, full, stuck, keeps } = *asked;
-    let header = frames[0].header().clone();
-    let geometry = header.geometry.clone();
+    let header = without_marks(frames[0].header());
     let sites = Site::of(&header);
     if sites.iter().any(|site| site.size.iter().any(|extent| *extent < MIN_EXTENT)) {
-        let [columns, rows] = [geometry.width, geometry.height];
+        let [columns, rows] = [header.geometry.width, header.geometry.height];
         return Err(header.refuse(format!("{columns}x{rows} photosites are too few for statistics of each class")));
     }
-    let stand_ins = |place: usize| stuck.map_or_else(Vec::new, |stuck| stuck.stand_ins(place));
-    let tally = |(place, site): (usize, &Site)| Tally::new(site, frames.len(), [top, full], stand_ins(place));
-    let mut tallies: Vec<Tally> = sites.iter().enumerate().map(tally).collect();
-    let planes = geometry.channels.len();
-    let mut picture = keeps.then(|| vec![0.0; geometry.row_samples() * geometry.height]);
+    let geometry = &header.geometry;
     let step = frames.iter().map(|frame| geometry.band_rows(frame.natural_rows(), 1)).max().unwrap_or(1).max(1);
-    let mut bands: Vec<Vec<f32>> = vec![Vec::new(); frames.len()];
-    let (mut done, mut bits, mut quad) = (0, 0, Quad::default());
-    let mut prints = Prints::new(frames.len(), geometry.height);
+    let rows_from = |first: usize| step.min(geometry.height - first);
+    let mut sums = Sums::new(&header, &sites, frames.len(), asked);
+    let [mut ahead, mut band] = [Band::new(frames.len()), Band::new(frames.len())];
+    ahead.read(frames, rows_from(0), geometry)?;
+    let mut done = 0;
     while done < geometry.height {
-        let rows = step.min(geometry.height - done);
-        frames.par_iter_mut().zip(&mut bands).try_for_each(|(frame, band)| {
-            band.clear();
-            frame.read(rows, band)
-        })?;
-        if done == 0 {
-            bits = bands.iter().flatten().fold(0, |bits, sample| bits | whole(*sample));
-        }
-        quad.add(done, &bands[0], &geometry);
-        for row in 0..rows {
-            let samples = geometry.row_samples();
-            prints.add(done + row, &bands, row * samples..(row + 1) * samples);
-            for (site, tally) in sites.iter().zip(&mut tallies).filter(|(site, _)| site.is_in_row(done + row)) {
-                let plane = |row: usize| (row * planes + site.plane) * geometry.width;
-                tally.add(site, &bands, plane(row)..plane(row) + geometry.width);
-                if let Some(picture) = &mut picture {
-                    site.spread(tally.means(), &mut picture[plane(done + row)..][..geometry.width]);
-                }
-            }
-        }
+        std::mem::swap(&mut ahead, &mut band);
+        let rows = band.rows;
+        // The next rows are decoded as these are summed.
+        let (read, ()) = rayon::join(|| ahead.read(frames, rows_from(done + rows), geometry), || sums.add(done, &band));
+        read?;
         done += rows;
     }
+    let Sums { tallies, picture, bits, quad, prints, .. } = sums;
     let sites: Vec<SiteSurvey> = tallies.into_iter().map(Tally::finish).collect();
     if sites.iter().any(|site| !(site.mean.is_finite() && site.variance.is_finite())) {
         return Err(Error::format(&header.name, "it, or one with it, holds samples that are not finite"));
     }
-    Ok(Survey { geometry, sites, picture, bits, quad: quad.means(), prints: prints.finish() })
+    let (quad, prints) = (quad.means(), prints.finish());
+    Ok(Survey { geometry: header.geometry, sites, picture, bits, quad, prints })
+}
+
+/// Rows of all frames.
+struct Band {
+    rows: usize,
+    /// Those of each frame, laid out as `[row][channel][column]`.
+    samples: Vec<Vec<f32>>,
+    /// Marks of each frame, `[row][column]`; empty where it has none.
+    marks: Vec<Vec<f32>>,
+}
+
+impl Band {
+    fn new(frames: usize) -> Self {
+        Self { rows: 0, samples: vec![Vec::new(); frames], marks: vec![Vec::new(); frames] }
+    }
+
+    /// Reads so many rows of frames of such a geometry, the layer of marks apart.
+    fn read<S: RowSource>(&mut self, frames: &mut [S], rows: usize, geometry: &Geometry) -> Result<()> {
+        self.rows = rows;
+        if rows == 0 {
+            return Ok(());
+        }
+        frames.par_iter_mut().zip(&mut self.samples).zip(&mut self.marks).try_for_each(|((frame, samples), marks)| {
+            samples.clear();
+            frame.read(rows, samples)?;
+            if is_marked(frame.header()) {
+                split_off(samples, marks, rows, geometry);
+            }
+            Ok(())
+        })
+    }
+}
+
+/// What is summed over rows.
+struct Sums<'a> {
+    geometry: &'a Geometry,
+    sites: &'a [Site],
+    tallies: Vec<Tally>,
+    picture: Option<Vec<f32>>,
+    bits: u32,
+    quad: Quad,
+    prints: Prints,
+}
+
+impl<'a> Sums<'a> {
+    fn new(header: &'a FrameHeader, sites: &'a [Site], frames: usize, asked: &Asked) -> Self {
+        let Asked { ends, full, stuck, keeps } = *asked;
+        let geometry = &header.geometry;
+        let stand_ins = |place: usize| stuck.map_or_else(Vec::new, |stuck| stuck.stand_ins(place));
+        let tally = |(place, site): (usize, &Site)| Tally::new(site, frames, ends, full, stand_ins(place));
+        Self {
+            geometry,
+            sites,
+            tallies: sites.iter().enumerate().map(tally).collect(),
+            picture: keeps.then(|| vec![0.0; geometry.row_samples() * geometry.height]),
+            bits: 0,
+            quad: Quad::default(),
+            prints: Prints::new(frames, geometry.height),
+        }
+    }
+
+    /// Adds rows, the first of which is row `first` of the frames.
+    fn add(&mut self, first: usize, Band { rows, samples, marks }: &Band) {
+        let Self { geometry, sites, .. } = *self;
+        let (planes, width) = (geometry.channels.len(), geometry.width);
+        if first == 0 {
+            self.bits = samples.iter().flatten().fold(0, |bits, sample| bits | whole(*sample));
+        }
+        self.quad.add(first, &samples[0], geometry);
+        for row in 0..*rows {
+            let row_samples = geometry.row_samples();
+            self.prints.add(first + row, samples, row * row_samples..(row + 1) * row_samples);
+            let own = sites.iter().zip(&mut self.tallies).filter(|(site, _)| site.is_in_row(first + row));
+            for (site, tally) in own {
+                let plane = |row: usize| (row * planes + site.plane) * width;
+                tally.mark(site, marks, row * width..(row + 1) * width);
+                tally.add(site, samples, plane(row)..plane(row) + width);
+                if let Some(picture) = &mut self.picture {
+                    site.spread(tally.means(), &mut picture[plane(first + row)..][..width]);
+                }
+            }
+        }
+    }
 }
 
 /// A sample as a code; of what is no whole number all bits.

@@ -2,7 +2,10 @@
 
 use super::falling::{Falling, FallingSums};
 use super::lanes::{depart, dot, sum};
+use super::marks::Marks;
 use super::neighbors::NeighborSums;
+use super::row_drift::RowScatter;
+use super::settings::Ends;
 use super::sites::Site;
 use super::strangers::{RowSlopes, excess};
 use super::stuck::StandIn;
@@ -30,12 +33,17 @@ pub struct SiteSurvey {
     /// Columns and rows of the grid's photosites that have samples at the top code, or at the largest sample where that is not known, row by
     /// row; none where they are many.
     pub at_top: Vec<[usize; 2]>,
+    /// Columns and rows of those that are marked as defective or interpolated in any of the frames, row by row; more than a hundredth of all are
+    /// cut short.
+    pub mended: Vec<[usize; 2]>,
     /// Photosites whose means are at or above that of full ones, where that is known.
     pub full: u64,
     /// The largest sample, and how many are it, where no top code is known.
     pub largest: Option<(f64, u64)>,
     /// Mean squares of the temporal noise.
     pub temporal: MeanSquares,
+    /// How rows go with their neighbors.
+    pub row_scatter: RowScatter,
     /// Mean squares of the mean of the frames.
     pub spatial: MeanSquares,
     /// Fourth cumulant of the mean of the frames at single photosites, 0 or more, by the differences of neighbors: half of theirs.
@@ -66,7 +74,9 @@ impl SiteSurvey {
 pub struct Tally {
     size: [usize; 2],
     frames: usize,
+    bottom: f64,
     top: f64,
+    marks: Marks,
     at_ends: [u64; 2],
     at_top: Vec<[usize; 2]>,
     /// The mean of full photosites, and how many have it.
@@ -114,14 +124,16 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Of such a grid in so many frames, whose largest code is `top` and whose full photosites have such a mean, where these are known;
+    /// Of such a grid in so many frames, whose codes have such ends and whose full photosites have such a mean, where these are known;
     /// photosites that are stuck have others stand in.
-    pub fn new(site: &Site, frames: usize, [top, full]: [Option<f64>; 2], stand_ins: Vec<StandIn>) -> Self {
+    pub fn new(site: &Site, frames: usize, ends: Ends, full: Option<f64>, stand_ins: Vec<StandIn>) -> Self {
         let columns = site.size[0];
         Self {
             size: site.size,
             frames,
-            top: top.unwrap_or(f64::INFINITY),
+            bottom: ends.bottom.unwrap_or(f64::NEG_INFINITY),
+            top: ends.top.unwrap_or(f64::INFINITY),
+            marks: Marks::new(columns, frames, most_at_top(site.size)),
             at_ends: [0; 2],
             at_top: Vec::new(),
             full: (full.unwrap_or(f64::INFINITY), 0),
@@ -150,6 +162,11 @@ impl Tally {
             above: vec![0.0; columns],
             instructions: Instructions::widest(),
         }
+    }
+
+    /// Takes the marks of the row that is added next, which stand at such a place in those of each frame that has any.
+    pub fn mark(&mut self, site: &Site, marks: &[Vec<f32>], place: Range<usize>) {
+        self.marks.read(site, marks, place, self.row_means.len());
     }
 
     /// Adds a row: that which stands at such a place in the band of each frame.
@@ -187,13 +204,16 @@ impl Tally {
             for (mean, sample) in self.means.iter_mut().zip(samples) {
                 *mean += *sample;
                 at_top += u64::from(*sample >= self.top);
-                at_bottom += u64::from(*sample <= 0.0);
+                at_bottom += u64::from(*sample <= self.bottom);
             }
             self.at_ends[0] += at_top;
             self.at_ends[1] += at_bottom;
         }
+        if self.marks.is_any() {
+            self.count_marks();
+        }
         let mut reaches_top = self.at_ends[0] > at_top_before;
-        if self.top == f64::INFINITY {
+        if self.top == f64::INFINITY && !self.marks.is_any() {
             let largest = self.samples.iter().copied().fold(self.largest.0, f64::max);
             let before = if largest > self.largest.0 { 0 } else { self.largest.1 };
             let count: u64 = self.samples.iter().map(|sample| u64::from(*sample == largest)).sum();
@@ -210,13 +230,25 @@ impl Tally {
         self.uneven += first.iter().zip(&first[1..]).map(|(one, next)| u64::from(one != next)).sum::<u64>();
     }
 
+    /// Counts the samples of the row that marks call saturated and their level does not.
+    fn count_marks(&mut self) {
+        for (frame, samples) in self.samples.chunks_exact(self.size[0]).enumerate() {
+            let is_told =
+                |(column, sample): &(usize, &f64)| **sample < self.top && self.marks.is_saturated(frame, *column);
+            self.at_ends[0] += samples.iter().enumerate().filter(is_told).count() as u64;
+        }
+    }
+
     /// Notes the photosites of a row that reach the top, as long as they are few.
     fn note_top(&mut self, row: usize) {
         let columns = self.size[0];
         let top = if self.top < f64::INFINITY { self.top } else { self.largest.0 };
         let most = most_at_top(self.size);
+        let is_at_top = |frame: usize, column: usize| {
+            self.marks.is_saturated(frame, column) || self.samples[frame * columns + column] >= top
+        };
         if self.at_top.len() <= most {
-            let reaches = |column: &usize| (0..self.frames).any(|frame| self.samples[frame * columns + column] >= top);
+            let reaches = |column: &usize| (0..self.frames).any(|frame| is_at_top(frame, *column));
             let own: Vec<[usize; 2]> =
                 (0..columns).filter(reaches).take(most + 1).map(|column| [column, row]).collect();
             self.at_top.extend(own);
@@ -358,13 +390,13 @@ impl Tally {
         let left = |sum: f64, each: f64, frame: usize, of_mean: f64| {
             sum / each - drifts[frame] - slopes[frame] * (of_mean / each - above)
         };
-        let by_rows: f64 = self
-            .row_sums
-            .chunks_exact(self.frames)
-            .zip(&self.row_means)
-            .flat_map(|(sums, of_mean)| sums.iter().enumerate().map(move |(frame, sum)| (frame, *sum, *of_mean)))
-            .map(|(frame, sum, of_mean)| left(sum, columns, frame, of_mean).powi(2))
-            .sum();
+        let of_frame = |frame: usize| -> Vec<f64> {
+            let of_rows = self.row_sums.chunks_exact(self.frames).zip(&self.row_means);
+            of_rows.map(|(sums, of_mean)| left(sums[frame], columns, frame, *of_mean)).collect()
+        };
+        let of_rows: Vec<Vec<f64>> = (0..self.frames).map(of_frame).collect();
+        let by_rows: f64 = of_rows.iter().flatten().map(|left| left * left).sum();
+        let row_scatter = RowScatter::of(&of_rows, frames - 1.0, self.size[0]);
         let by_columns: f64 = self
             .column_sums
             .chunks_exact(self.size[0])
@@ -391,10 +423,12 @@ impl Tally {
             variance_variance: self.variance_variance(&drifts, n),
             at_ends: self.at_ends,
             at_top: if self.at_top.len() <= most_at_top(self.size) { self.at_top } else { Vec::new() },
+            mended: self.marks.mended,
             full: self.full.1,
             largest: (self.top == f64::INFINITY).then_some(self.largest),
             strangers: std::mem::take(&mut self.slopes).strangers(self.size, &spatial, &temporal),
             temporal,
+            row_scatter,
             spatial,
             excess: excess(self.within, self.frames, n),
             falling: self.falling.finish(frames, times),

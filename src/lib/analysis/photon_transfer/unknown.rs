@@ -46,6 +46,7 @@ pub fn without_gain(
         stuck: Vec::new(),
         early: Vec::new(),
         hot: None,
+        drift: None,
     }
 }
 

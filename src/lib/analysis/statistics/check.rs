@@ -16,6 +16,10 @@ pub enum Subject {
     Variance,
     /// The correlation of two channels: Fisher's z.
     Correlation,
+    /// The variance of the means of rows: χ².
+    VarianceOfRowMeans,
+    /// The variance of the means of columns: χ².
+    VarianceOfColumnMeans,
     /// Mean and variance together of a channel of which hardly a sample should leave its code, or whose variance hangs on
     /// few samples: Markov's inequality.
     Deviation,

@@ -110,8 +110,8 @@ fn measure_all(
     });
     let tallies = match (at_hand, &mut portrait) {
         (Some(tallies), _) => tallies,
-        (None, Some(portrait)) => tallies(&mut sitting(&mut watch, portrait), regions, &levels)?,
-        (None, None) => tallies(&mut watch, regions, &levels)?,
+        (None, Some(portrait)) => tallies(&mut sitting(&mut watch, portrait), regions, &levels, level.is_some())?,
+        (None, None) => tallies(&mut watch, regions, &levels, level.is_some())?,
     };
     if level.is_some() {
         check_fair(&watch, saturated)?;
@@ -130,7 +130,10 @@ fn measure_all(
         // What is left where pixels are left out by their values follows no formula; those of defects are any.
         let prediction = prediction.as_ref().ok().filter(|_| is_fair(marks));
         let assessment = Assessment::new(tally, &frame, *region, prediction, sampling);
-        let tests = if level.is_some() { assessment.tests() } else { Vec::new() };
+        let mut tests = if level.is_some() { assessment.tests() } else { Vec::new() };
+        if let (Some(lines), Some(FramePrediction::Planes(classes))) = (&tally.lines, prediction) {
+            tests.extend(lines.tests(&frame, classes));
+        }
         assessment.report(&frame, *region, &levels).with_marks(*marks, left_out).tested(tests)
     };
     let regions = regions.iter().zip(&tallies).zip(&counts).enumerate().map(report).collect();
@@ -161,7 +164,7 @@ fn at_hand(
     if !is_checked || watch.may_wait() {
         return Ok(None);
     }
-    let found = tallies(watch, regions, levels)?;
+    let found = tallies(watch, regions, levels, true)?;
     check_fair(watch, saturated)?;
     Ok(Some(found))
 }

@@ -13,6 +13,7 @@ mod groups;
 pub mod histogram;
 mod laws;
 mod levels;
+mod lines;
 mod measure;
 mod over_frames;
 pub mod patches;

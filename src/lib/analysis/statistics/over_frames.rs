@@ -115,7 +115,7 @@ impl OverFrames {
             pixels.add(at, samples);
             at += samples.len();
         });
-        let tallies = tallies(&mut adding, &seen.regions, &levels)?;
+        let tallies = tallies(&mut adding, &seen.regions, &levels, false)?;
         for (of_region, tally) in seen.of_frames.iter_mut().zip(&tallies) {
             of_region.add(tally);
         }
@@ -228,9 +228,9 @@ impl Seen {
         let levels = Levels::of(frame)?;
         let count = self.pixels.count();
         let mut means = self.plane(|index| self.pixels.means()[index]);
-        let means = tallies(&mut means, &self.regions, &levels)?;
+        let means = tallies(&mut means, &self.regions, &levels, false)?;
         let mut variances = self.plane(|index| self.pixels.variance(index));
-        let variances = tallies(&mut variances, &self.regions, &levels)?;
+        let variances = tallies(&mut variances, &self.regions, &levels, false)?;
         let predicted = Repeated::of(frame, settings.equations, count).map_err(|why| why.to_string());
         let predicted = match self.exposures.unlike() {
             Some(differs) if predicted.is_ok() => Err(differs.to_owned()),
@@ -292,6 +292,7 @@ impl FrameTallies {
             channels: self.temporal(0, &variances.channels, &means.channels, frames),
             classes: of_classes
                 .map(|(variances, means)| [0, 1, 2].map(|k| self.temporal(k + 1, &variances[k], &means[k], frames))),
+            lines: None,
         }
     }
 

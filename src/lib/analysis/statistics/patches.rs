@@ -162,7 +162,7 @@ pub fn measure(
     let mut watch = Watch::new(source, saturated, &regions);
     let frame = watch.header().clone();
     let levels = Levels::of(&frame)?;
-    let tallies = tallies(&mut watch, &regions, &levels)?;
+    let tallies = tallies(&mut watch, &regions, &levels, false)?;
     let (counts, left_out) = watch.seen();
     let mut unpredicted = None;
     let mut of_frame = laws::Laws::default();
@@ -320,7 +320,7 @@ fn at_level(measured: [f64; 3], frame: &FrameHeader, equations: Equations) -> Op
 
 /// Means of the three planes, or of the classes of one; NaN for a class of which there is none.
 fn means(tally: &Tally) -> Option<[f64; 3]> {
-    let Tally { channels, classes } = tally;
+    let Tally { channels, classes, .. } = tally;
     if channels.count == 0 {
         return None;
     }

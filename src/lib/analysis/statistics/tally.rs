@@ -1,6 +1,7 @@
 //! What was seen of the samples of a region.
 
 use super::levels::Levels;
+use super::lines::LineSums;
 use super::region::Region;
 use crate::cfa::Class;
 use crate::error::Result;
@@ -18,6 +19,8 @@ pub(super) struct Tally {
     pub channels: Moments,
     /// Of the classes of a CFA plane, each by itself.
     pub classes: Option<[Moments; 3]>,
+    /// Of rows and columns, where they are tested.
+    pub lines: Option<LineSums>,
 }
 
 /// Pixels of a region that are worth a task of their own.
@@ -27,10 +30,16 @@ const SHARE: usize = 1 << 14;
 ///
 /// Each row of a region is summed by itself and merged in order, whatever the threads: the rows of one region side by side
 /// where regions are few, or regions side by side.
-pub(super) fn tallies(source: &mut dyn RowSource, regions: &[Region], levels: &Levels) -> Result<Vec<Tally>> {
+pub(super) fn tallies(
+    source: &mut dyn RowSource,
+    regions: &[Region],
+    levels: &Levels,
+    are_tested: bool,
+) -> Result<Vec<Tally>> {
     let frame = source.header().clone();
     let empty = || Tally::new(&frame, levels);
-    let mut tallies: Vec<Tally> = regions.iter().map(|_| empty()).collect();
+    let lines = |region: &Region| LineSums::of(&frame, *region).filter(|_| are_tested);
+    let mut tallies: Vec<Tally> = regions.iter().map(|region| Tally { lines: lines(region), ..empty() }).collect();
     let mut of_rows: Vec<Tally> = Vec::new();
     fold([source], frame.geometry.height, |band| {
         let (rows, window) = (band.rows(), band.window(0));
@@ -41,10 +50,14 @@ pub(super) fn tallies(source: &mut dyn RowSource, regions: &[Region], levels: &L
                     of_rows.resize_with(seen.len(), empty);
                 }
                 let side_by_side = of_rows[..seen.len()].par_iter_mut().zip(seen.clone());
-                side_by_side.with_min_len((SHARE / region.width).max(1)).for_each(|(of_row, y)| {
-                    of_row.clear();
-                    of_row.add_row(&frame, window, y, *region, levels);
-                });
+                let sum_rows = || {
+                    side_by_side.with_min_len((SHARE / region.width).max(1)).for_each(|(of_row, y)| {
+                        of_row.clear();
+                        of_row.add_row(&frame, window, y, *region, levels);
+                    });
+                };
+                let lines = &mut tally.lines;
+                rayon::join(sum_rows, || lines.iter_mut().for_each(|lines| lines.add_all(window, seen.clone())));
                 for of_row in &of_rows[..seen.len()] {
                     tally.merge(of_row);
                 }
@@ -57,6 +70,7 @@ pub(super) fn tallies(source: &mut dyn RowSource, regions: &[Region], levels: &L
                     of_row.add_row(&frame, window, y, *region, levels);
                     tally.merge(of_row);
                 }
+                tally.lines.iter_mut().for_each(|lines| lines.add_all(window, region.rows_among(&rows)));
             });
         }
         Ok(())
@@ -67,7 +81,7 @@ pub(super) fn tallies(source: &mut dyn RowSource, regions: &[Region], levels: &L
 impl Tally {
     fn new(frame: &FrameHeader, levels: &Levels) -> Self {
         let classes = levels.array.map(|_| [const { 1 }; 3].map(Moments::new));
-        Self { channels: Moments::new(frame.geometry.channels.len()), classes }
+        Self { channels: Moments::new(frame.geometry.channels.len()), classes, lines: None }
     }
 
     fn clear(&mut self) {

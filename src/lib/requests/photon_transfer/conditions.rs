@@ -1,10 +1,13 @@
 //! The frames of a measurement, told apart by light, exposure and temperature.
 
+use super::corrections::{AsTaken, give_back};
 use crate::analysis::photon_transfer::Condition;
+use crate::camera::levels::WhiteLevel;
 use crate::error::{Error, Result};
 use crate::formats::format::SampleType;
 use crate::formats::frame_list::{FrameKind, ListedFrame};
 use crate::formats::input::{FrameReader, InputOptions};
+use crate::formats::many::OneOfMany;
 use crate::formats::places::is_waited_on;
 use crate::metadata::{FrameHeader, TakenAs};
 use crate::requests::described::{Described, DescribedWithBlack};
@@ -42,6 +45,8 @@ pub struct Head {
     pub header: FrameHeader,
     /// The exposure time in s, where the file tells it or a user does.
     pub exposure_s: Option<f64>,
+    /// Whether marks of saturated samples come with it.
+    pub has_marks: bool,
 }
 
 /// How each file is read, and what is said of all frames.
@@ -86,19 +91,30 @@ impl Reading {
             let problem = format!("it holds {holds}; photon transfer takes frames before they are demosaicked");
             return Err(head.refuse(problem));
         }
-        if metadata.correction.is_some() {
-            return Err(head.refuse("it is corrected already; photon transfer takes frames as the camera gives them"));
-        }
-        Ok(Head { header: head, exposure_s })
+        self.as_taken(&mut head);
+        Ok(Head { header: head, exposure_s, has_marks: reader.has_mask() })
     }
 
-    /// Puts what is said into the metadata of a frame whose head was seen.
+    /// Gives a head the level that came off, where that is all; of other corrected samples only what is said tells a largest.
+    fn as_taken(&self, head: &mut FrameHeader) {
+        give_back(head);
+        if head.metadata.correction.is_some() {
+            head.metadata.white_level_adu = self.described.described.white_level_adu.map(WhiteLevel::from);
+        }
+    }
+
+    /// Frames whose heads were seen, as they are described, so many of which others may have open besides.
     ///
     /// # Errors
     ///
     /// As [`Self::head_of`].
-    pub fn describe(&self, frame: &mut FrameHeader) -> Result<()> {
-        self.described.apply_time(frame).map(drop)
+    pub fn open_all(&self, files: &[PathBuf], others: usize) -> Result<Vec<AsTaken>> {
+        let options = files.iter().map(|file| self.options(file)).collect();
+        let described = |mut frame: OneOfMany| {
+            self.described.apply_time(frame.header_mut())?;
+            Ok(AsTaken::of(frame))
+        };
+        OneOfMany::open_all(options, others)?.into_iter().map(described).collect()
     }
 
     /// What is read of a file.
@@ -189,7 +205,7 @@ fn doubt_of_times(list: &str, groups: &[Group]) -> Option<Note> {
 }
 
 /// The condition of a frame, by the list and by what it says itself, and what tells its light apart.
-fn condition(frame: &ListedFrame, Head { header: head, exposure_s }: &Head) -> Result<(Condition, String)> {
+fn condition(frame: &ListedFrame, Head { header: head, exposure_s, .. }: &Head) -> Result<(Condition, String)> {
     let metadata = &head.metadata;
     let own = *exposure_s;
     if let (Some(listed), Some(own)) = (frame.exposure_s, own)

@@ -2,6 +2,7 @@
 
 mod checks;
 mod conditions;
+mod corrections;
 mod surveys;
 
 use super::described::{Described, DescribedWithBlack};
@@ -22,6 +23,7 @@ use checks::{
 };
 use clap::Args;
 use conditions::{Group, Reading, grouped, in_folder};
+use corrections::{check_same, corrected, in_words};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use surveys::Surveys;
@@ -72,6 +74,8 @@ pub struct MeasuredCamera {
     pub confidence: f64,
     /// Temperature of the sensor in K, where it is known.
     pub temperature_k: Option<f64>,
+    /// What the frames were corrected by, and what that does to the numbers, where they were.
+    pub corrected: Option<String>,
     /// What came up.
     pub notes: Vec<Note>,
 }
@@ -98,8 +102,10 @@ impl PhotonTransfer {
         };
         let first = &first.header;
         for head in &heads {
+            check_same(first, &head.header)?;
             check_alike(first, &head.header)?;
         }
+        let corrected = corrected(first, heads.iter().any(|head| head.has_marks));
         let descriptor = is_folder.then(|| frame_list::descriptor_in(&self.list)).flatten();
         let grouped = grouped(&list_name, &frames, &heads);
         let (groups, mut notes) = grouped.map_err(|error| without_descriptor(error, descriptor.as_deref()))?;
@@ -111,18 +117,25 @@ impl PhotonTransfer {
         let are_codes = first.metadata.quantity != QuantityKind::Electrons;
         let mut taken = Surveys::of(first, &groups, &read, are_codes)?;
         let largest = taken.largest;
-        if first.metadata.white_level_adu.is_none() && are_codes {
+        if first.metadata.white_level_adu.is_none() && are_codes && corrected.is_none() {
             notes.push(doubt_of_end(&list_name, largest));
         }
         check_array(first, &groups, &taken.found)?;
         notes.extend(doubt_of_array(first, &groups, &taken.found));
         notes.extend(doubt_of_frames(&groups, &taken.found));
         notes.extend(doubt_of_patterns(&groups, &taken.found));
-        let settings =
-            Settings { confidence: self.confidence, photon_error: self.photon_error, are_codes, top: largest };
+        let settings = Settings {
+            confidence: self.confidence,
+            photon_error: self.photon_error,
+            are_codes,
+            top: largest,
+            corrected: corrected.unwrap_or_default(),
+        };
         let temperature_k = main_temperature(&groups);
         let mut classes = taken.measured(temperature_k, &settings)?;
-        taken.find_hot(&mut classes, temperature_k, settings.rounding())?;
+        if !settings.corrected.lost_dark {
+            taken.find_hot(&mut classes, temperature_k, settings.rounding())?;
+        }
         let (surveys, largest) = (taken.found, taken.largest);
         notes.extend(doubt_of_codes(&list_name, first, &surveys, largest));
         let rounding = settings.rounding();
@@ -141,6 +154,7 @@ impl PhotonTransfer {
             largest,
             confidence: self.confidence,
             temperature_k,
+            corrected: corrected.and_then(|corrected| in_words(first, corrected)),
             notes,
         })
     }

@@ -4,11 +4,10 @@
 use super::checks::{check_no_copies, check_same_light, end_below, end_of_codes};
 use super::conditions::{Group, Reading};
 use crate::analysis::photon_transfer::{
-    Asked, Blur, ClassFindings, Condition, Level, Picture, Settings, Site, SiteSurvey, Stuck, Survey, dark_of_offset,
-    dark_of_tail, full_mean, hot_tail, of_class, parted, pattern_view, survey_as,
+    Asked, Blur, ClassFindings, Condition, Ends, Level, Picture, Settings, Site, SiteSurvey, Stuck, Survey,
+    dark_of_offset, dark_of_tail, full_mean, hot_tail, of_class, parted, pattern_view, survey_as,
 };
 use crate::error::{Error, Result};
-use crate::formats::many::OneOfMany;
 use crate::frame::Geometry;
 use crate::metadata::FrameHeader;
 use rayon::prelude::*;
@@ -51,7 +50,9 @@ impl<'a> Surveys<'a> {
         let mut found: Vec<Option<Survey>> = vec![None; self.groups.len()];
         for is_lit in [true, false] {
             let wanted = |(place, _): &(usize, &mut Option<Survey>)| self.groups[*place].condition.is_lit == is_lit;
-            let own: Vec<_> = found.iter_mut().enumerate().filter(wanted).collect();
+            let mut own: Vec<_> = found.iter_mut().enumerate().filter(wanted).collect();
+            // Stacks begin first, so that no thread is left alone with one.
+            own.sort_by_key(|(place, _)| std::cmp::Reverse(self.groups[*place].files.len()));
             own.into_par_iter().with_max_len(1).try_for_each(|(place, survey)| -> Result<()> {
                 *survey = Some(self.survey(place, stacks.contains(&place))?);
                 Ok(())
@@ -67,7 +68,7 @@ impl<'a> Surveys<'a> {
             survey.iter().flat_map(|survey| &survey.sites).try_for_each(|site| check_same_light(group, site, reach))?;
         }
         self.found = found.into_iter().flatten().collect();
-        if !self.is_said && self.are_codes {
+        if !self.is_said && self.are_codes && !self.is_corrected() {
             self.largest = end_of_codes(self.groups, &mut self.found);
         }
         // Codes that end below what is said to be their end: samples at the end are counted again.
@@ -78,6 +79,11 @@ impl<'a> Surveys<'a> {
             return self.read_all();
         }
         Ok(())
+    }
+
+    /// Whether more than a level came off the samples, which then do not tell where codes end.
+    fn is_corrected(&self) -> bool {
+        self.head.metadata.correction.is_some()
     }
 
     /// The least mean of full photosites of all classes that saturate.
@@ -94,14 +100,11 @@ impl<'a> Surveys<'a> {
         /// Files that other groups may have open meanwhile.
         const OTHERS: usize = 64;
         let group = &self.groups[place];
-        let options = group.files.iter().map(|file| self.read.options(file)).collect();
-        let mut frames = OneOfMany::open_all(options, OTHERS)?;
-        for frame in &mut frames {
-            self.read.describe(frame.header_mut())?;
-        }
+        let mut frames = self.read.open_all(&group.files, OTHERS)?;
         let top = self.largest.filter(|_| self.is_said);
         let full = self.full.filter(|_| !group.condition.is_lit);
-        let found = survey_as(&mut frames, &Asked { top, full, stuck: Some(&self.stuck), keeps })?;
+        let ends = Ends { bottom: (!self.is_corrected()).then_some(0.0), top };
+        let found = survey_as(&mut frames, &Asked { ends, full, stuck: Some(&self.stuck), keeps })?;
         for site in &found.sites {
             if let Some((frame, mean)) =
                 site.frame_means.iter().enumerate().find(|(_, mean)| top.is_some_and(|top| **mean > top))
@@ -146,7 +149,7 @@ impl<'a> Surveys<'a> {
         let classes = self.findings(temperature_k, settings);
         self.keep_pictures(&classes)?;
         let all = self.stuck_photosites(&classes)?.unwrap_or_default();
-        let all = all.with_early(&Site::of(self.head), &self.early());
+        let all = all.with_others(&Site::of(self.head), &self.early(), &self.mended());
         if !all.is_any() {
             return Ok(classes);
         }
@@ -165,6 +168,18 @@ impl<'a> Surveys<'a> {
                     "photosites that are full, or reach the largest code, under light that is far from it, as hot ones do, are left out of all numbers, dark \
                      current and its pattern too: {count}, which `defects.clipped` of the JSON names"
                 ));
+            }
+            let mended = self.stuck.mended_of_class(&class.name);
+            if mended > 0 {
+                class.notes.push(format!(
+                    "photosites that are marked as defective, or were interpolated from others, are left out of all numbers: {mended}"
+                ));
+            } else if all.mended_of_class(&class.name) > 0 {
+                class.doubts.push(
+                    "more than one in a hundred photosites are marked as defective, or were interpolated from others: they count in all \
+                     numbers, and make noise too small"
+                        .into(),
+                );
             }
             class.stuck = self.stuck.of_class(&class.name);
             let share = all.share(&class.name);
@@ -260,7 +275,8 @@ impl<'a> Surveys<'a> {
             let mut places: Vec<[usize; 2]> = Vec::new();
             for (_, survey) in lit() {
                 let own = &survey.sites[grid];
-                if self.largest.is_some_and(|top| own.at_ends[0] > 0 && is_far(own, top)) {
+                let end = self.largest.or(self.full.filter(|_| self.is_corrected()));
+                if end.is_some_and(|end| own.at_ends[0] > 0 && is_far(own, end)) {
                     places.extend(&own.at_top);
                 }
                 let full = self.full.filter(|full| is_far(own, *full));
@@ -280,6 +296,18 @@ impl<'a> Surveys<'a> {
         if self.are_codes { sites.iter().enumerate().map(of).collect() } else { vec![Vec::new(); sites.len()] }
     }
 
+    /// Photosites of each grid that are marked as mended in any frame: columns and rows.
+    fn mended(&self) -> Vec<Vec<[usize; 2]>> {
+        let of = |grid: usize| {
+            let mut places: Vec<[usize; 2]> =
+                self.found.iter().flat_map(|survey| &survey.sites[grid].mended).copied().collect();
+            places.sort_by_key(|[column, row]| (*row, *column));
+            places.dedup();
+            places
+        };
+        (0..Site::of(self.head).len()).map(of).collect()
+    }
+
     /// Photosites that hold one value, by a flat and the dark of the time nearest to its own; none where there are none, or no dark.
     fn stuck_photosites(&mut self, classes: &[ClassFindings]) -> Result<Option<Stuck>> {
         let both = classes.iter().find_map(|class| Some([class.stacks[0]?.0, class.stacks[1]?.0]));
@@ -295,7 +323,8 @@ impl<'a> Surveys<'a> {
         let [light, dark] = places.map(picture);
         let Some((light, dark)) = light.zip(dark) else { return Ok(None) };
         let Geometry { width, channels, .. } = &self.head.geometry;
-        let found = Stuck::of(&Site::of(self.head), [*width, channels.len()], [&dark, &light], self.are_codes);
+        let are_codes = self.are_codes && !self.is_corrected();
+        let found = Stuck::of(&Site::of(self.head), [*width, channels.len()], [&dark, &light], are_codes);
         Ok(found.is_any().then_some(found))
     }
 
