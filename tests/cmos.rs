@@ -268,7 +268,7 @@ fn what_rows_share_is_not_left_out() {
 /// columns show it, before demosaicking.
 #[test]
 fn noise_of_rows_and_columns_is_not_that_of_photosites() {
-    let light = scene([160, 120], [900.0, 2000.0, 1500.0]);
+    let light = scene([320, 240], [900.0, 1100.0, 1000.0]);
     let planes = digitized(&noisy(&light, &NoiseSettings { seed: 11, sensor_seed: 12, ..Default::default() }));
     let plane = plane_of(&planes);
     for frame in [&planes, &plane] {

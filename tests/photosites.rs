@@ -88,6 +88,42 @@ fn full_hot_photosites_do_not_count_in_dark_current() {
     }
 }
 
+/// Cameras whose black level drifts along rows by three times the noise of these: noise of rows, columns and photosites, gain and patterns lie
+/// within their intervals as often as is stated.
+#[test]
+fn drift_along_rows_is_no_noise_of_rows() {
+    const KEYS: [&str; 6] =
+        ["row_noise_e", "column_noise_e", "pixel_noise_e", "gain_adu_per_e", "prnu_column", "dsnu_column_e"];
+    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(40, |count| count.parse().unwrap());
+    let found: Vec<([Option<bool>; 6], bool)> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let plain = camera(index, Kind::Cmos);
+            let readout = ReadOut { black_drift_e: 3.0 * plain.row_noise_e, black_drift_rows: 40.0, ..plain };
+            let [flats, darks] = levels(&readout, index);
+            let found = found(&flats, &darks);
+            let truths = [
+                readout.row_noise_e,
+                readout.column_noise_e,
+                readout.read_noise_e,
+                readout.adu_per_e,
+                readout.prnu_column,
+                readout.dsnu_column_e,
+            ];
+            let holds = |key: &str, truth: f64| {
+                let interval = found.get(key)?;
+                Some((interval.low..=interval.high).contains(&truth))
+            };
+            ([0, 1, 2, 3, 4, 5].map(|place| holds(KEYS[place], truths[place])), found.drift.is_some())
+        })
+        .collect();
+    for (place, key) in KEYS.iter().enumerate() {
+        check_misses(key, found.iter().map(|(held, _)| held[place]));
+    }
+    let told = found.iter().filter(|(_, is_told)| *is_told).count();
+    assert!(told > found.len() / 2, "drift is told of {told} cameras alone");
+}
+
 /// Of a camera three photosites that hold the largest code, one value, and code 0 with light and without are named and left out: its
 /// patterns are those without them, dead ones empty no report, and their neighbors do not stand out.
 #[test]

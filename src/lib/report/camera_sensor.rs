@@ -347,8 +347,9 @@ fn drift_of(camera: &MeasuredCamera, told: &mut Told) -> [f64; 2] {
     if found.is_empty() {
         return [0.0; 2];
     }
-    ["black_drift_e", "black_drift_rows"]
-        .map(|key| told.tell(key, Origin::Derived, "by how means of rows of darks differ, over the rows between them"));
+    for key in ["black_drift_e", "black_drift_rows"] {
+        told.tell(key, Origin::Derived, "by how means of rows of darks differ, over the rows between them");
+    }
     let is_array = camera.head.geometry.channels.len() == 1;
     let period = camera.head.metadata.cfa.filter(|_| is_array).map_or(1, |array| array.period()[1]);
     [mean(|drift| drift.variance).sqrt(), (mean(|drift| drift.rows_per_knot) * period as f64).max(2.0)]

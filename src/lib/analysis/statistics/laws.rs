@@ -101,7 +101,7 @@ pub(super) fn of_mean(
 }
 
 /// Whether photosites are told by their places.
-fn is_by_place(found: &FramePrediction) -> bool {
+pub(super) fn is_by_place(found: &FramePrediction) -> bool {
     matches!(found, FramePrediction::Groups(_) | FramePrediction::Tapped(_))
 }
 

@@ -266,10 +266,8 @@ fn at_means(tally: &Tally, frame: &FrameHeader, region: Region, equations: Equat
     if !found.has_lines() {
         return Some(found);
     }
-    match laws::of_samples(&uniform, region, equations) {
-        Ok(by_place @ (FramePrediction::Groups(_) | FramePrediction::Tapped(_))) => Some(by_place),
-        _ => Some(found),
-    }
+    let by_place = laws::of_samples(&uniform, region, equations).ok().filter(laws::is_by_place);
+    Some(by_place.unwrap_or(found))
 }
 
 /// The uniform scene whose predicted means lead back to such electrons, and what is predicted of it: where full well or an end of the codes holds
