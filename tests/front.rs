@@ -84,6 +84,8 @@ fn the_front_door_answers_what_people_type() {
     ] {
         assert_eq!(told(typed), told(meant), "{typed}");
     }
+    assert_eq!(text(&shop, "render-radiance --list nikon d850 --size 8x6"), told("list sensors nikon d850"));
+    assert_eq!(text(&shop, "predict-noise --list"), told("list sensors"));
     let found = told("keys sensor Full_Well");
     assert!(found.contains("readout.full_well_e: number; e-") && found.lines().count() < 6, "{found}");
     assert!(told("keys full_well_e").contains("readout.full_well_e: number"));

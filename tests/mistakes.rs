@@ -9,7 +9,7 @@ use support::TREE;
 use support::workshop::{BAD_DATA, BAD_USAGE, Workshop};
 
 /// The likeliest mistakes with each program: the command, the exit status, the line.
-const MISTAKES: [(&str, i32, &str); 138] = [
+const MISTAKES: [(&str, i32, &str); 139] = [
     (
         "preview codes.exr plane.exr -o {steam}.png",
         BAD_USAGE,
@@ -69,6 +69,11 @@ const MISTAKES: [(&str, i32, &str); 138] = [
         "measure codes.exr -o codes.xlsx",
         BAD_USAGE,
         "no report is written as .xlsx; there are text, json, yaml, csv; give another --output",
+    ),
+    (
+        "predict-noise --electrons 900,2000,4000 --patch 4x9000",
+        BAD_USAGE,
+        "a patch of 4x9000 pixels is larger than the sensor, which has 2614x1966 photosites; give another --patch",
     ),
     (
         "predict-noise --dark -o noise.png",

@@ -68,7 +68,10 @@ pub fn start<A: CommandFactory + FromArgMatches>(
         }
     }
     if asks_for("list_sensors", &command) {
-        return ended(program, show(|| std::io::stdout().write_all(inventory::page(Kind::Sensors, &[]).as_bytes())));
+        let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
+        let of = words.skip_while(|word| word != "--list").skip(1);
+        let page = inventory::page(Kind::Sensors, &of.take_while(|word| !word.starts_with('-')).collect::<Vec<_>>());
+        return ended(program, show(|| std::io::stdout().write_all(page.as_bytes())));
     }
     let words = wildcards::expanded(std::env::args_os().skip(1), &command);
     let all = std::iter::once(program.into()).chain(words.iter().cloned());

@@ -13,7 +13,7 @@ pub struct SensorRequest {
     /// Sensor: a known name, or a file
     #[arg(long, value_name = "NAME|FILE", default_value = data::DEFAULT_SENSOR)]
     pub sensor: String,
-    /// List the sensors that are known by name, with what each has and lacks
+    /// List the sensors that are known by name, with what each has and lacks; words behind it pick those of which they are told
     #[arg(id = "list_sensors", long = "list")]
     pub list: bool,
     /// Sensor whose read-out counts in place of the sensor's own

@@ -16,7 +16,7 @@ pub struct SensorChoice {
     /// Sensor, for a frame whose metadata names none, or another than it names
     #[arg(long, value_name = "NAME|FILE")]
     pub sensor: Option<String>,
-    /// List the sensors that are known by name, with what each has and lacks
+    /// List the sensors that are known by name, with what each has and lacks; words behind it pick those of which they are told
     #[arg(id = "list_sensors", long = "list")]
     pub list: bool,
     /// Sensor whose read-out counts in place of that of the frame's sensor, or of --sensor

@@ -21,9 +21,17 @@ pub(super) fn of_converter(readout: &ReadOut) -> Option<Note> {
 /// # Errors
 ///
 /// [`Error::Usage`] for it.
-pub(super) fn check_place(readout: &ReadOut, patch: Option<([usize; 2], [i64; 2])>) -> Result<()> {
-    let Some((size, corner)) = patch else { return Ok(()) };
+pub(super) fn check_place(readout: &ReadOut, patch: Option<[usize; 2]>, at: Option<[i64; 2]>) -> Result<()> {
+    let Some(size) = patch else { return Ok(()) };
     let sides = [readout.width, readout.height];
+    if (0..2).any(|axis| size[axis] as u64 > u64::from(sides[axis])) {
+        let problem = format!(
+            "a patch of {}x{} pixels is larger than the sensor, which has {}x{} photosites",
+            size[0], size[1], sides[0], sides[1]
+        );
+        return Err(Error::Usage(problem).change(&["patch"]));
+    }
+    let Some(corner) = at else { return Ok(()) };
     let is_on =
         |axis: usize| (0..=i64::from(sides[axis]).saturating_sub_unsigned(size[axis] as u64)).contains(&corner[axis]);
     if is_on(0) && is_on(1) {

@@ -251,7 +251,7 @@ impl NoisePrediction {
             return Err(Error::Usage("a sweep scales the signal of a scene, but this one is dark".into()));
         }
         notes.extend(doubts::of_converter(sensor.readout()?));
-        doubts::check_place(sensor.readout()?, self.patch.zip(self.patch_at))?;
+        doubts::check_place(sensor.readout()?, self.patch, self.patch_at)?;
         let color = self.color(&sensor, &mut notes)?;
         let is_absolute = color.as_ref().is_some_and(|color| !color.is_relative) && self.sweep.is_none();
         let true_xyz = radiance.filter(|_| is_absolute).and_then(|radiance| {
