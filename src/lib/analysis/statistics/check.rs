@@ -398,7 +398,9 @@ pub(super) fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: u
         return None;
     }
     let center = expected.atanh() + expected / (2.0 * freedom);
-    let z = (found.clamp(-1.0, 1.0).atanh() - center) * (freedom - 2.0).sqrt();
+    let off = found.clamp(-1.0, 1.0).atanh() - center;
+    let z = off * (freedom - 2.0).sqrt();
+    let few = if sampling.variance_thirds.is_some() { of_few_lines(expected, off, freedom) } else { 0.0 };
     Some(Test {
         subject: Subject::Correlation,
         channels: vec![measured.names[i].clone(), measured.names[j].clone()],
@@ -407,8 +409,21 @@ pub(super) fn correlation(measured: &Measured<'_>, sampling: &Sampling, index: u
         z: Some(z),
         bounded: None,
         degrees_of_freedom: Some(freedom),
-        p: significance::of_normal(z),
+        p: significance::of_normal(z).max(few),
     })
+}
+
+/// The probability of a correlation that is lower by such a difference of artanh r where it is that of what few rows or columns share, S
+/// beside what is a photosite's own, D: artanh r = ½ ln(1 + 2S/D), and S is like χ² of k degrees of freedom, which its logarithm is far from
+/// normal below. 2 (ρ/(1 + ρ))²/k is the variance of artanh r. None of one that is higher, whose tail is shorter than normal.
+fn of_few_lines(expected: f64, off: f64, freedom: f64) -> f64 {
+    if expected <= 0.0 || off >= 0.0 {
+        return 0.0;
+    }
+    let lines = 2.0 * (freedom - 2.0) * (expected / (1.0 + expected)).powi(2);
+    let ratio = |artanh: f64| (2.0 * artanh).exp_m1();
+    let share = ratio(expected.atanh() + off) / ratio(expected.atanh());
+    significance::of_chi_square(lines * share, lines)
 }
 
 /// The same where few products of samples make up the covariance, as where two that are far off meet by chance: Markov's inequality
