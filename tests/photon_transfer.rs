@@ -5,9 +5,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
 use crate::support;
-use cyanometer::analysis::photon_transfer::{
-    ClassFindings, Condition, Corrected, KEYS, Level, Settings, of_class, survey,
-};
+use cyanometer::analysis::photon_transfer::{ClassFindings, Condition, KEYS, Level, Settings, of_class, survey};
 use cyanometer::camera::optics::Exposure;
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::chain::{CameraSetup, uniform_frame};
@@ -195,13 +193,7 @@ fn shaken(index: u32, shake: Shake, words: &str) -> (bool, [Option<[f64; 2]>; 6]
     let readout = camera(index, Kind::Ccd);
     let [flats, darks, warm] = levels_of((&readout, index, shake));
     let all: Vec<Level> = darks.iter().chain(&warm).cloned().collect();
-    let settings = Settings {
-        confidence: CONFIDENCE,
-        photon_error: 0.0,
-        are_codes: true,
-        top: None,
-        corrected: Corrected::default(),
-    };
+    let settings = Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top: None, corrected: None };
     let found = of_class("G", &flats, &darks, &all, &settings);
     assert_eq!(found.suspects, [], "{index}");
     let currents = [readout.temperature_k, WARM_K].map(|kelvin| readout.dark_current_e_per_s(kelvin));
@@ -530,13 +522,8 @@ fn saturation_is_said_to_be_of_photosites_or_of_the_converter() {
         }
         let [flats, darks] = levels(&readout, index);
         let of = |top: Option<f64>| {
-            let settings = Settings {
-                confidence: CONFIDENCE,
-                photon_error: 0.0,
-                are_codes: true,
-                top,
-                corrected: Corrected::default(),
-            };
+            let settings =
+                Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top, corrected: None };
             let found = of_class("G", &flats, &darks, &darks, &settings);
             let what = found.findings.iter().find(|finding| finding.key == "saturation_e").unwrap().what;
             (what, found)
@@ -705,13 +692,7 @@ fn an_error_of_all_photons_does_not_average_out() {
             &flats,
             &darks,
             &darks,
-            &Settings {
-                confidence: CONFIDENCE,
-                photon_error,
-                are_codes: true,
-                top: None,
-                corrected: Corrected::default(),
-            },
+            &Settings { confidence: CONFIDENCE, photon_error, are_codes: true, top: None, corrected: None },
         )
     };
     let (exact, off) = (of(0.0), of(0.03));

@@ -2,7 +2,7 @@
 
 use super::misses::CONFIDENCE;
 use cyanometer::analysis::photon_transfer::{
-    Asked, ClassFindings, Condition, Corrected, Ends, Level, Settings, Site, full_mean, of_class, survey, survey_as,
+    Asked, ClassFindings, Condition, Ends, Level, Settings, Site, full_mean, of_class, survey, survey_as,
 };
 use cyanometer::camera::optics::Exposure;
 use cyanometer::camera::readout::ReadOut;
@@ -182,7 +182,7 @@ pub fn measured(readout: &ReadOut, index: u32) -> ClassFindings {
 }
 
 pub fn settings() -> Settings {
-    Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top: None, corrected: Corrected::default() }
+    Settings { confidence: CONFIDENCE, photon_error: 0.0, are_codes: true, top: None, corrected: None }
 }
 
 pub fn found(flats: &[Level], darks: &[Level]) -> ClassFindings {

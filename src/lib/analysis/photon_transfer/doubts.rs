@@ -201,7 +201,7 @@ fn curved(curve: &Curve) -> Option<String> {
 mod tests {
     use super::super::findings::of_class;
     use super::super::level::{Condition, Level};
-    use super::super::settings::{Corrected, Settings};
+    use super::super::settings::Settings;
     use super::super::strangers::tests::normal;
     use super::super::survey::survey;
     use crate::frame::{Geometry, to_sample};
@@ -231,8 +231,8 @@ mod tests {
         let flats: Vec<Level> = times().map(|(key, s)| level(40_000.0 * s, s, key, change)).collect();
         let dark = |(key, s): (u32, f64)| level(0.0, s, 10 + key, &|code| change(code - drop_adu * f64::from(key)));
         let darks: Vec<Level> = times().map(dark).collect();
-        let corrected = Corrected::default();
-        let settings = Settings { confidence: 0.95, photon_error: 0.0, are_codes: true, top: Some(4095.0), corrected };
+        let settings =
+            Settings { confidence: 0.95, photon_error: 0.0, are_codes: true, top: Some(4095.0), corrected: None };
         of_class("Y", &flats, &darks, &darks, &settings).doubts
     }
 

@@ -135,7 +135,7 @@ pub fn of_class(
     };
     let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
     // What darks took off the frames they do not show.
-    let kept = |found: Found| if settings.corrected.lost_dark { Err(LOST_DARK.into()) } else { found };
+    let kept = |found: Found| if settings.lost_dark() { Err(LOST_DARK.into()) } else { found };
     add("dark_current_e_per_s", kept(number(&per_second, reasons.of_times()).map(sampled)));
     let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
     let why = if curve.is_silent { reasons.of_noise() } else { reasons.of_times() };

@@ -25,8 +25,8 @@ enum What {
     Photosites,
     /// Of so many codes, one or the other.
     Either(f64),
-    /// One or the other, as marks of saturated samples do not tell which.
-    Marked,
+    /// One or the other, as frames that were corrected do not tell which.
+    Corrected,
     Nothing,
 }
 
@@ -49,14 +49,16 @@ impl Limit {
             );
             return named("saturation capacity, of the converter", Some(told), What::Converter(top), is_reached);
         }
-        if settings.corrected.is_marked && last.at_ends[0] > MANY {
-            let told = "saturation is that of samples which are marked as saturated; whether photosites or the converter end there, frames as \
-                        the camera gives them would tell";
-            return named("saturation capacity, of either", Some(told.to_owned()), What::Marked, is_reached);
+        if let Some(Corrected { is_marked, .. }) = settings.corrected {
+            let end =
+                if is_marked { "samples that are marked as saturated" } else { "the flat of the largest variance" };
+            let told = format!(
+                "saturation is that of {end}: whether photosites or the converter end there, frames as the camera gives them would tell"
+            );
+            return named("saturation capacity, of either", Some(told), What::Corrected, is_reached);
         }
         // Noise of the read-out is left where photosites are full, and none where the converter is.
-        let is_raw = settings.corrected == Corrected::default();
-        let is_one_code = settings.are_codes && is_raw && settings.top.is_none() && last.variance < LEAST_VARIANCE;
+        let is_one_code = settings.are_codes && settings.top.is_none() && last.variance < LEAST_VARIANCE;
         if is_one_code {
             let told = format!(
                 "whether photosites or the converter end at {:.1} ADU is not known: the largest code, given by --white, would tell",
@@ -116,9 +118,9 @@ impl Limit {
                 "photosites or the converter end at {mean:.1} ADU: it is no less than {reached_e:.0} e-, and the largest code, given by \
                  --white, would tell which"
             )),
-            What::Marked => Err(format!(
-                "photosites or the converter end where samples are marked as saturated: it is no less than {reached_e:.0} e-, and frames as \
-                 the camera gives them would tell which"
+            What::Corrected => Err(format!(
+                "photosites or the converter end first: it is no less than {reached_e:.0} e-, and frames as the camera gives them would tell \
+                 which"
             )),
             What::Photosites if self.is_reached => Ok(()),
             _ => Err("no flat is so bright that every photosite is full: flats of more light would tell".into()),

@@ -14,12 +14,12 @@ pub struct Settings {
     pub are_codes: bool,
     /// The largest code, where it is known.
     pub top: Option<f64>,
-    /// What was done to the samples before.
-    pub corrected: Corrected,
+    /// What was done to the samples before, where more than a level came off.
+    pub corrected: Option<Corrected>,
 }
 
 /// What was done to samples before they are measured, beyond a level that comes back.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Corrected {
     /// Whether marks beside the samples, and not their levels, tell which are saturated.
     pub is_marked: bool,
@@ -43,6 +43,11 @@ impl Default for Ends {
 }
 
 impl Settings {
+    /// Whether what dark charge adds on average came off the samples.
+    pub fn lost_dark(&self) -> bool {
+        self.corrected.is_some_and(|corrected| corrected.lost_dark)
+    }
+
     /// The variance of the error of rounding, in samples².
     pub fn rounding(&self) -> f64 {
         if self.are_codes { ROUNDING } else { 0.0 }

@@ -129,11 +129,11 @@ impl PhotonTransfer {
             photon_error: self.photon_error,
             are_codes,
             top: largest,
-            corrected: corrected.unwrap_or_default(),
+            corrected,
         };
         let temperature_k = main_temperature(&groups);
         let mut classes = taken.measured(temperature_k, &settings)?;
-        if !settings.corrected.lost_dark {
+        if !settings.lost_dark() {
             taken.find_hot(&mut classes, temperature_k, settings.rounding())?;
         }
         let (surveys, largest) = (taken.found, taken.largest);
