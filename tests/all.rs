@@ -12,6 +12,7 @@ mod corpus;
 mod correction;
 mod corrections;
 mod described;
+mod divided;
 mod dng;
 mod doubts;
 mod drift;

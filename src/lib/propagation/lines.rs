@@ -133,10 +133,15 @@ fn anew_apart(model: &NoiseModel) -> NoiseModel {
 }
 
 impl Photosite {
+    /// All averages that its samples follow from.
+    pub(super) fn averages(&self) -> impl Iterator<Item = &Dark> {
+        let flat = self.flat.iter().flat_map(|flat| std::iter::once(&flat.frames).chain(flat.darks.iter().flatten()));
+        self.darks.iter().flatten().chain(flat)
+    }
+
     /// All models of noise that its samples follow from.
     pub(super) fn models(&self) -> impl Iterator<Item = &NoiseModel> {
-        let flat = self.flat.iter().flat_map(|flat| std::iter::once(&flat.frames).chain(flat.darks.iter().flatten()));
-        std::iter::once(&self.model).chain(self.darks.iter().flatten().chain(flat).map(|dark| &dark.model))
+        std::iter::once(&self.model).chain(self.averages().map(|dark| &dark.model))
     }
 
     /// Makes sure that formulas are known for what rows and columns share, and for fixed offsets, at a level that is known to a fraction of a
@@ -152,10 +157,8 @@ impl Photosite {
         if self.equations == Equations::Paper {
             return Err(Unpredictable::Beyond(NOT_IN_THE_PAPER));
         }
-        let flat = self.flat.iter().flat_map(|flat| std::iter::once(&flat.frames).chain(flat.darks.iter().flatten()));
-        let mut averages = self.darks.iter().flatten().chain(flat);
         let is_shared = |dark: &Dark| Axis::ALL.iter().any(|axis| axis.parts(&dark.model.lines)[0] > 0.0);
-        if averages.any(|dark| is_shared(dark) && dark.frames > 2 && dark.combine != Combine::Mean) {
+        if self.averages().any(|dark| is_shared(dark) && dark.frames > 2 && dark.combine != Combine::Mean) {
             return Err(Unpredictable::Beyond(NO_MEANS));
         }
         let Some(adc) = self.adc else { return Ok(()) };

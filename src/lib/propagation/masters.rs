@@ -271,7 +271,7 @@ impl Flat {
         let darks = Dark::all(frame, &record.masters, of_sensor)?;
         let level_adu = record.black_adu.map_or(0.0, |black| black - adc.bias_adu);
         // What dark signal is left in the means is no light.
-        let dark_e = |model: &NoiseModel| model.dark_e * sensitivity(model.dcnu).0;
+        let dark_e = |model: &NoiseModel| model.dark_e * sensitivity(model.dcnu).0 + model.tails.mean_hot_e();
         let off_e: f64 = darks.iter().flatten().map(|dark| dark.weight * dark_e(&dark.model)).sum();
         let left_e = dark_e(&model) - off_e - level_adu / adc.adu_per_e;
         let light_e = |mean: f64| (mean / adc.adu_per_e - left_e) / sensitivity(model.response()).0;

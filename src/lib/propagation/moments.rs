@@ -84,6 +84,15 @@ impl Prediction {
         ]
     }
 
+    /// The same of samples that are so many times as large, that share nothing.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        let MeanVariance { mean, variance } = self.moments;
+        let square = factor * factor;
+        let (third, fourth) = (self.third * factor.powi(3), self.fourth() * square * square);
+        let scaled = Self::of_cumulants(factor * mean, square * variance, third, fourth);
+        Self { sixth: self.sixth * square.powi(3), ..scaled }
+    }
+
     /// Fourth cumulant.
     pub fn fourth(&self) -> f64 {
         self.excess_kurtosis * self.moments.variance.powi(2)

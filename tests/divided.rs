@@ -1,0 +1,148 @@
+//! Frames of sensors that are no plain ones, divided by a flat field: they have the noise that is predicted of them.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+use crate::support;
+use cyanometer::analysis::statistics::{Saturated, measure};
+use cyanometer::camera::readout::ReadOut;
+use cyanometer::cfa::CfaPattern;
+use cyanometer::color::Space;
+use cyanometer::propagation::{Equations, of_frame};
+use cyanometer::stages::demosaic::Method;
+use cyanometer::stream::MemoryFrame;
+use rayon::prelude::*;
+use support::chain::{colored, demosaicked};
+use support::kit::{Camera, Chance, Kit};
+
+const STAGES: [&str; 5] = ["CFA plane", "BI", "ECI", "MHC", "XYZ"];
+
+/// A camera, its kit and the exposure of its frames.
+struct Bench {
+    camera: Camera,
+    kit: Kit,
+    exposure_s: f64,
+    electrons: [f64; 3],
+}
+
+/// A camera that `change` makes of a plain one, with darks, flats and darks of these or bias frames, as chance has them.
+fn bench(seed: u64, size: [usize; 2], change: impl Fn(&mut Chance, &mut ReadOut)) -> Bench {
+    let mut chance = Chance(seed);
+    for _ in 0..4 {
+        chance.next();
+    }
+    let mut readout = support::readout();
+    readout.dark_current_na_per_cm2 = None;
+    readout.dark_current_e_per_s = Some(chance.between(20.0, 400.0));
+    readout.dcnu = chance.between(0.02, 0.2);
+    readout.prnu = chance.between(0.002, 0.02);
+    readout.read_noise_e = chance.between(4.0, 12.0);
+    readout.bits = 14;
+    readout.full_well_e = 60_000.0;
+    readout.adu_per_e = chance.between(0.2, 0.3);
+    readout.bias_adu = chance.between(500.0, 900.0);
+    change(&mut chance, &mut readout);
+    let temperature_k = readout.temperature_k;
+    let camera =
+        Camera { readout, size, cfa: Some(CfaPattern::ALL[chance.whole(0, 3)]), seed: 1000 * seed, frames: 0.into() };
+    let (exposure_s, flat_s) = (chance.between(0.02, 0.3), chance.between(0.02, 0.2));
+    let electrons = [(); 3].map(|()| chance.between(300.0, 16_000.0));
+    let level = [(); 3].map(|()| chance.between(6000.0, 16_000.0));
+    let mut kit = Kit::default();
+    let mut count = || chance.whole(1, 6);
+    let counts = [(); 4].map(|()| count());
+    kit.darks = camera.darks(counts[0], exposure_s, temperature_k);
+    kit.flats = (0..counts[1]).map(|_| camera.expose(level, flat_s, temperature_k)).collect();
+    match seed % 3 {
+        // Dark signal stays in the flat field.
+        0 => kit.biases = camera.darks(counts[2], 1e-5, temperature_k),
+        _ => kit.flat_darks = camera.darks(counts[2], flat_s, temperature_k),
+    }
+    if seed % 3 == 0 {
+        // Of frames that keep theirs too bias frames alone come off.
+        kit.darks.clear();
+    }
+    Bench { camera, kit, exposure_s, electrons }
+}
+
+impl Bench {
+    fn frame(&self) -> MemoryFrame {
+        let temperature_k = self.camera.readout.temperature_k;
+        self.kit.correct(&self.camera.expose(self.electrons, self.exposure_s, temperature_k))
+    }
+}
+
+/// The corrected plane without its layer of marks, where no sample has any.
+fn plane(corrected: &MemoryFrame) -> MemoryFrame {
+    let mut header = corrected.header.clone();
+    header.geometry.channels.truncate(1);
+    let width = header.geometry.width;
+    let rows = || corrected.samples.chunks_exact(2 * width);
+    assert!(rows().all(|rows| rows[width..].iter().all(|mark| *mark == 0.0)), "samples are marked");
+    MemoryFrame::new(header, rows().flat_map(|rows| rows[..width].to_vec()).collect())
+}
+
+/// What is said of a frame: subjects of tests and their deviates.
+fn told(frame: &MemoryFrame) -> Vec<(String, f64)> {
+    if let Err(why) = of_frame(&frame.header, Equations::Exact) {
+        eprintln!("nothing predicted: {why}");
+        return Vec::new();
+    }
+    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+    let report = measure(&mut source, &[], Saturated::Kept, Equations::Exact, Some(0.5)).unwrap();
+    let tests = report.regions.into_iter().next().unwrap().tests;
+    tests.iter().filter_map(|test| test.deviate().map(|z| (format!("{:?}", test.subject), z))).collect()
+}
+
+/// Deviates of means and variances at every stage have rms 1 within 4 standard errors, and none is above 5. CYANOMETER_CAMERAS sets how many
+/// cameras.
+fn check(most: u64, size: [usize; 2], change: impl Fn(&mut Chance, &mut ReadOut) + Sync) {
+    let cameras: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(most, |count| count.parse().unwrap());
+    let trials: Vec<(u64, Vec<Vec<(String, f64)>>)> = (1..=cameras)
+        .into_par_iter()
+        .map(|seed| {
+            let plane = plane(&bench(seed, size, &change).frame());
+            let methods = [Method::Bilinear, Method::EffectiveColor, Method::Malvar];
+            let pixels = methods.map(|method| demosaicked(&plane, method));
+            let xyz = colored(&pixels[1], Space::Xyz);
+            (seed, [plane].iter().chain(&pixels).chain([&xyz]).map(told).collect())
+        })
+        .collect();
+    let mut failures = Vec::new();
+    for (stage, name) in STAGES.iter().enumerate() {
+        for subject in ["Mean", "Variance"] {
+            let of = |(seed, stages): &(u64, Vec<Vec<(String, f64)>>)| -> Vec<(u64, f64)> {
+                stages[stage].iter().filter(|(of, _)| of == subject).map(|(_, z)| (*seed, *z)).collect()
+            };
+            let deviates: Vec<(u64, f64)> = trials.iter().flat_map(of).collect();
+            let n = deviates.len() as f64;
+            let rms = (deviates.iter().map(|(_, z)| z * z).sum::<f64>() / n).sqrt();
+            let (worst, most) =
+                deviates.iter().fold((0, 0.0_f64), |at, (seed, z)| if z.abs() > at.1.abs() { (*seed, *z) } else { at });
+            // Channels that are made of the same photosites are as good as one.
+            let error = (0.5 / if stage == 0 { n } else { n / 3.0 }).sqrt();
+            eprintln!("{name}, {subject}: rms {rms:.3} of {n}, ±{error:.3}; largest {most:.2} of camera {worst}");
+            if n < 2.5 * cameras as f64 || (rms - 1.0).abs() > 4.0 * error || most.abs() > 5.0 {
+                failures.push(format!("{name}, {subject}: rms {rms}, largest {most} of camera {worst}"));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// Hot pixels that make up to half the dark signal, and jumps as large as the read noise.
+fn tailed(chance: &mut Chance, readout: &mut ReadOut) {
+    let kinds = chance.whole(0, 2);
+    if kinds != 0 {
+        readout.hot_pixel_share = chance.between(0.005, 0.1);
+        readout.hot_pixel_dark_current_e_per_s = chance.between(300.0, 3000.0);
+    }
+    if kinds != 1 {
+        readout.rts_share = chance.between(0.02, 0.3);
+        readout.rts_amplitude_e = chance.between(4.0, 40.0);
+    }
+}
+
+#[test]
+fn hot_pixels_and_jumps_are_predicted() {
+    check(24, [120, 100], tailed);
+}
