@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
 
 use crate::support;
-use cyanometer::analysis::statistics::{Saturated, measure};
+use cyanometer::analysis::statistics::{Region, Saturated, measure};
 use cyanometer::camera::readout::ReadOut;
 use cyanometer::cfa::CfaPattern;
 use cyanometer::color::Space;
@@ -14,7 +14,10 @@ use rayon::prelude::*;
 use support::chain::{colored, demosaicked};
 use support::kit::{Camera, Chance, Kit};
 
-const STAGES: [&str; 5] = ["CFA plane", "BI", "ECI", "MHC", "XYZ"];
+const STAGES: [&str; 7] = ["three planes", "CFA plane", "a region", "BI", "ECI", "MHC", "XYZ"];
+
+/// A part of a plane.
+const PART: Region = Region { x: 21, y: 12, width: 44, height: 32 };
 
 /// A camera, its kit and the exposure of its frames.
 struct Bench {
@@ -25,7 +28,7 @@ struct Bench {
 }
 
 /// A camera that `change` makes of a plain one, with darks, flats and darks of these or bias frames, as chance has them.
-fn bench(seed: u64, size: [usize; 2], change: impl Fn(&mut Chance, &mut ReadOut)) -> Bench {
+fn bench(seed: u64, size: [usize; 2], is_plane: bool, change: impl Fn(&mut Chance, &mut ReadOut)) -> Bench {
     let mut chance = Chance(seed);
     for _ in 0..4 {
         chance.next();
@@ -42,8 +45,8 @@ fn bench(seed: u64, size: [usize; 2], change: impl Fn(&mut Chance, &mut ReadOut)
     readout.bias_adu = chance.between(500.0, 900.0);
     change(&mut chance, &mut readout);
     let temperature_k = readout.temperature_k;
-    let camera =
-        Camera { readout, size, cfa: Some(CfaPattern::ALL[chance.whole(0, 3)]), seed: 1000 * seed, frames: 0.into() };
+    let cfa = Some(CfaPattern::ALL[chance.whole(0, 3)]).filter(|_| is_plane);
+    let camera = Camera { readout, size, cfa, seed: 1000 * seed, frames: 0.into() };
     let (exposure_s, flat_s) = (chance.between(0.02, 0.3), chance.between(0.02, 0.2));
     let electrons = [(); 3].map(|()| chance.between(300.0, 16_000.0));
     let level = [(); 3].map(|()| chance.between(6000.0, 16_000.0));
@@ -74,21 +77,21 @@ impl Bench {
 /// The corrected plane without its layer of marks, where no sample has any.
 fn plane(corrected: &MemoryFrame) -> MemoryFrame {
     let mut header = corrected.header.clone();
-    header.geometry.channels.truncate(1);
-    let width = header.geometry.width;
-    let rows = || corrected.samples.chunks_exact(2 * width);
-    assert!(rows().all(|rows| rows[width..].iter().all(|mark| *mark == 0.0)), "samples are marked");
-    MemoryFrame::new(header, rows().flat_map(|rows| rows[..width].to_vec()).collect())
+    header.geometry.channels.pop();
+    let [all, ours] = [&corrected.header, &header].map(|header| header.geometry.row_samples());
+    let rows = || corrected.samples.chunks_exact(all);
+    assert!(rows().all(|row| row[ours..].iter().all(|mark| *mark == 0.0)), "samples are marked");
+    MemoryFrame::new(header, rows().flat_map(|row| row[..ours].to_vec()).collect())
 }
 
 /// What is said of a frame: subjects of tests and their deviates.
-fn told(frame: &MemoryFrame) -> Vec<(String, f64)> {
+fn told(frame: &MemoryFrame, parts: &[Region]) -> Vec<(String, f64)> {
     if let Err(why) = of_frame(&frame.header, Equations::Exact) {
         eprintln!("nothing predicted: {why}");
         return Vec::new();
     }
     let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-    let report = measure(&mut source, &[], Saturated::Kept, Equations::Exact, Some(0.5)).unwrap();
+    let report = measure(&mut source, parts, Saturated::Kept, Equations::Exact, Some(0.5)).unwrap();
     let tests = report.regions.into_iter().next().unwrap().tests;
     tests.iter().filter_map(|test| test.deviate().map(|z| (format!("{:?}", test.subject), z))).collect()
 }
@@ -100,11 +103,12 @@ fn check(most: u64, size: [usize; 2], change: impl Fn(&mut Chance, &mut ReadOut)
     let trials: Vec<(u64, Vec<Vec<(String, f64)>>)> = (1..=cameras)
         .into_par_iter()
         .map(|seed| {
-            let plane = plane(&bench(seed, size, &change).frame());
+            let [planes, plane] = [false, true].map(|is_plane| plane(&bench(seed, size, is_plane, &change).frame()));
             let methods = [Method::Bilinear, Method::EffectiveColor, Method::Malvar];
             let pixels = methods.map(|method| demosaicked(&plane, method));
             let xyz = colored(&pixels[1], Space::Xyz);
-            (seed, [plane].iter().chain(&pixels).chain([&xyz]).map(told).collect())
+            let first = [told(&planes, &[]), told(&plane, &[]), told(&plane, &[PART])];
+            (seed, first.into_iter().chain(pixels.iter().chain([&xyz]).map(|frame| told(frame, &[]))).collect())
         })
         .collect();
     let mut failures = Vec::new();
@@ -119,7 +123,7 @@ fn check(most: u64, size: [usize; 2], change: impl Fn(&mut Chance, &mut ReadOut)
             let (worst, most) =
                 deviates.iter().fold((0, 0.0_f64), |at, (seed, z)| if z.abs() > at.1.abs() { (*seed, *z) } else { at });
             // Channels that are made of the same photosites are as good as one.
-            let error = (0.5 / if stage == 0 { n } else { n / 3.0 }).sqrt();
+            let error = (0.5 / if stage < 3 { n } else { n / 3.0 }).sqrt();
             eprintln!("{name}, {subject}: rms {rms:.3} of {n}, ±{error:.3}; largest {most:.2} of camera {worst}");
             if n < 2.5 * cameras as f64 || (rms - 1.0).abs() > 4.0 * error || most.abs() > 5.0 {
                 failures.push(format!("{name}, {subject}: rms {rms}, largest {most} of camera {worst}"));
@@ -140,6 +144,20 @@ fn tailed(chance: &mut Chance, readout: &mut ReadOut) {
         readout.rts_share = chance.between(0.02, 0.3);
         readout.rts_amplitude_e = chance.between(4.0, 40.0);
     }
+}
+
+/// Rows and columns whose noise, offsets and gains are as large as what photosites have of their own.
+fn lined(chance: &mut Chance, readout: &mut ReadOut) {
+    let mut part = |most: f64| if chance.next() < 0.4 { 0.0 } else { chance.between(0.2 * most, most) };
+    (readout.row_noise_e, readout.column_noise_e) = (part(30.0), part(30.0));
+    (readout.dsnu_e, readout.dsnu_row_e, readout.dsnu_column_e) = (part(20.0), part(20.0), part(20.0));
+    (readout.prnu_row, readout.prnu_column) = (part(0.006), part(0.006));
+    readout.read_noise_e = readout.read_noise_e.max(1.0 / readout.adu_per_e);
+}
+
+#[test]
+fn rows_and_columns_are_predicted() {
+    check(24, [120, 100], lined);
 }
 
 #[test]

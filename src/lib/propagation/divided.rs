@@ -36,12 +36,17 @@ struct Limits {
     /// The share of photosites at most that are noisier, and left out: what they, which their dark signal leaves hardly any light, make
     /// of the light is no ordinary pixel.
     left_out: f64,
+    /// What the series may leave out of the variance at photosites that are unlike most, and noisier.
+    lost: f64,
 }
 
 /// Where the series is good to 10⁻³.
-const STRICT: Limits = Limits { noise: 0.01, left_out: 0.0 };
+const STRICT: Limits = Limits { noise: 0.01, left_out: 0.0, lost: 1e-6 };
 /// Where it is good to a few hundredths, and a normal flat field near zero, 4.5 standard deviations off, adds as little.
-const WIDE: Limits = Limits { noise: 0.05, left_out: 0.01 };
+const WIDE: Limits = Limits { noise: 0.05, left_out: 0.01, lost: 0.01 };
+
+/// The relative variance of a flat field beyond which no photosite is followed.
+const MOST_NOISE: f64 = 0.1;
 
 impl Photosite {
     /// Moments of the class R, G or B after division by the flat field: with A what is left of the codes and F the flat
@@ -81,6 +86,9 @@ impl Photosite {
             return None;
         }
         let [first, square, scale, third, above, of_flat] = all.means();
+        if all.lost > limits.lost * (square - first * first) * all.weight {
+            return None;
+        }
         let mean = first * scale;
         let variance = ((square - first * first) * scale * scale).max(0.0);
         // ⟨F⟩ is a mean over as many photosites, the same patterns and the same noise as A/F:
@@ -134,7 +142,7 @@ impl Photosite {
             }
             let f = below.mean;
             let (rho, skew) = (below.variance / (f * f), below.third / f.powi(3));
-            if rho > limits.noise {
+            if rho > limits.noise && (share == 1.0 || is_rare || rho > MOST_NOISE) {
                 found.left_out += if is_rare { 0.0 } else { weight };
                 continue;
             }
@@ -146,6 +154,9 @@ impl Photosite {
             let square = ((above.mean.powi(2) + above.variance) * of_square - 4.0 * above.mean * both) / (f * f);
             // Third cumulant of the quotient, of its own noise and of the curvature of 1/F.
             let noise = above.variance / (f * f);
+            if rho > limits.noise {
+                found.lost += weight * 105.0 * rho.powi(3) * (first * first + noise);
+            }
             let offset = self.offsets_left(&adc, &flat, above.mean / f) / (f * f);
             let square = square + offset;
             let third = (above.third - above.mean.powi(3) * skew) / f.powi(3)

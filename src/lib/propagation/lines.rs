@@ -59,10 +59,6 @@ const OFFSETS_SHOW: &str = "photosites have fixed offsets, and the noise of the 
                             what they leave of these hang on where in a code each mean lies; more of them do not help, amplification \
                             before the converter does";
 
-/// Why nothing is said of samples over a flat field.
-const NORMALIZED: &str = "it was divided by a flat field whose rows or columns share noise or gains, and how far these move its level \
-                          is not predicted";
-
 /// Why nothing is said of a drift that codes follow on a curve.
 const DRIFT_CUT: &str = "its black level drifts along rows, and full well, an end of the codes or a step of them cuts what rows share \
                          by that";
@@ -176,16 +172,6 @@ impl Photosite {
         Ok(())
     }
 
-    /// Makes sure that the level of the flat field is as sure as its photosites are many.
-    ///
-    /// # Errors
-    ///
-    /// [`Unpredictable::Beyond`].
-    pub(super) fn check_level(&self) -> Predicted<()> {
-        let is_shared = self.flat.is_some() && self.has_lines();
-        if is_shared { Err(Unpredictable::Beyond(NORMALIZED)) } else { Ok(()) }
-    }
-
     /// Whether photosites of a row or of a column share anything.
     pub(super) fn has_lines(&self) -> bool {
         self.models().any(|model| model.lines.has_lines())
@@ -266,7 +252,7 @@ impl Photosite {
             column: of_class(column, k),
             drift: [0, 1, 2].map(|l| drift * slopes[k] * slopes[l]),
             drift_rows,
-            together: [0.0; 3],
+            ..LineCovariance::default()
         })
     }
 
@@ -372,9 +358,11 @@ impl Photosite {
 
     /// R of the straight codes, of such slopes.
     fn straight(&self, axis: Axis, expected_e: [f64; 3], [of_offsets, of_gains]: [[f64; 3]; 2]) -> Matrix3<f64> {
+        if let Some(shared) = self.shared_by_quotients(axis, expected_e) {
+            return Matrix3::from_fn(|k, l| of_offsets[k] * of_offsets[l] * shared[(k, l)]);
+        }
         let terms = self.terms(axis);
-        let x = self.line_signals(expected_e);
-        let at = |k: usize| (x[k], [of_offsets[k], of_gains[k]]);
+        let at = |k: usize| (expected_e[k], [of_offsets[k], of_gains[k]]);
         Matrix3::from_fn(|k, l| terms.between(at(k), at(l)))
     }
 
@@ -431,9 +419,9 @@ pub(super) type Site = (f64, [f64; 2]);
 /// What two photosites of signals x and y in one row, or column, share, in e²: a + b (x + y) + c x y.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LineTerms {
-    constant: f64,
-    linear: f64,
-    square: f64,
+    pub constant: f64,
+    pub linear: f64,
+    pub square: f64,
 }
 
 impl LineTerms {

@@ -19,6 +19,7 @@ pub mod covariance;
 mod curved;
 mod divided;
 mod divided_kinds;
+mod divided_lines;
 pub mod drift;
 mod drift_sampling;
 mod effort;

@@ -12,6 +12,8 @@ pub(super) struct Quotients {
     sums: [f64; 6],
     /// The share that is left out.
     pub left_out: f64,
+    /// What the series may leave out of the variance at few photosites that are noisier than its limit.
+    pub lost: f64,
     /// Of the variance that the noise of the flat field gives to that of samples.
     pub of_flat_noise: f64,
     /// Of what rounding is of the variance.
@@ -30,6 +32,7 @@ impl Quotients {
         self.weight += other.weight;
         self.sums.iter_mut().zip(other.sums).for_each(|(sum, value)| *sum += value);
         self.left_out += other.left_out;
+        self.lost += other.lost;
         self.of_flat_noise += other.of_flat_noise;
         self.rounding += other.rounding;
     }
