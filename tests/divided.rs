@@ -45,11 +45,17 @@ fn bench(seed: u64, size: [usize; 2], is_plane: bool, change: impl Fn(&mut Chanc
     readout.bias_adu = chance.between(500.0, 900.0);
     change(&mut chance, &mut readout);
     let temperature_k = readout.temperature_k;
-    let cfa = Some(CfaPattern::ALL[chance.whole(0, 3)]).filter(|_| is_plane);
+    let pattern = CfaPattern::ALL[chance.whole(0, 3)];
+    let cfa = Some(pattern).filter(|_| is_plane);
+    readout.cfa = pattern.into();
     let camera = Camera { readout, size, cfa, seed: 1000 * seed, frames: 0.into() };
     let (exposure_s, flat_s) = (chance.between(0.02, 0.3), chance.between(0.02, 0.2));
-    let electrons = [(); 3].map(|()| chance.between(300.0, 16_000.0));
-    let level = [(); 3].map(|()| chance.between(6000.0, 16_000.0));
+    let mut electrons = [(); 3].map(|()| chance.between(300.0, 16_000.0));
+    let mut level = [(); 3].map(|()| chance.between(6000.0, 16_000.0));
+    if camera.readout.smear_line_s > 0.0 {
+        // Columns with red photosites have the smear of those with blue ones.
+        (electrons[2], level[2]) = (electrons[0], level[0]);
+    }
     let mut kit = Kit::default();
     let mut count = || chance.whole(1, 6);
     let counts = [(); 4].map(|()| count());
@@ -158,6 +164,12 @@ fn lined(chance: &mut Chance, readout: &mut ReadOut) {
 #[test]
 fn rows_and_columns_are_predicted() {
     check(24, [120, 100], lined);
+}
+
+/// Smear of up to a tenth of the light.
+#[test]
+fn smear_is_predicted() {
+    check(12, [120, 100], |chance, readout| readout.smear_line_s = chance.between(2e-7, 1e-6));
 }
 
 #[test]

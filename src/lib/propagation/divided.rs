@@ -18,7 +18,7 @@ const NARROW: &str = "what was divided by a flat field, or the flat field, reach
                                  scatters over less than a code";
 /// The same of a converter that is not straight.
 const BENT: &str = "it was divided by a flat field, and the curve of its converter (`linearization`) is in both: what it makes of the quotient is not \
-                    predicted";
+                    predicted; correct it with `--linearize`";
 
 /// Why nothing is said of samples that were divided by noise.
 pub(super) const NOISY: &str = "the flat field is so noisy that what is divided by it follows no series here (standard deviations beyond \

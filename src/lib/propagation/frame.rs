@@ -205,7 +205,7 @@ impl Sites {
                 Self { moments: photosite.averaged(moments, expected_e, &average)?, ..sites }
             }
         };
-        ground.smeared.check_even(photosite.slope(), &sites.moments)?;
+        ground.smeared.check_even(&photosite, &sites.moments)?;
         Ok(sites)
     }
 
