@@ -78,7 +78,10 @@ impl Photosite {
         for kind in self.kinds_divided(class, expected_e) {
             let found = kind.site.quotients(class, expected_e, (kind.share, kind.is_rare), limits, &mut unlike)?;
             if found.weight > 0.0 {
-                parts.push((found.weight, found.law(kind.site.fourth_of_jumps(&found), kind.site.sixth_of_jumps(&found))));
+                parts.push((
+                    found.weight,
+                    found.law(kind.site.fourth_of_jumps(&found), kind.site.sixth_of_jumps(&found)),
+                ));
             }
             all.take(&found);
         }
@@ -127,8 +130,8 @@ impl Photosite {
         let (adc, flat) = (self.adc?, self.flat?);
         let light_e = flat.expected_e[class];
         let in_both: Vec<[Dark; 2]> = flat.in_both(&self.darks).collect();
-        let [lights, darks] =
-            [self.model.response(), self.model.dcnu].map(|sigma| if share == 1.0 { sensitivities(sigma) } else { few_sensitivities(sigma) });
+        let [lights, darks] = [self.model.response(), self.model.dcnu]
+            .map(|sigma| if share == 1.0 { sensitivities(sigma) } else { few_sensitivities(sigma) });
         let mut found = Quotients::default();
         for (&(x, of_x), &(u, of_u)) in lights.iter().flat_map(|x| darks.iter().map(move |u| (x, u))) {
             let (site, weight) = ([x, u], share * of_x * of_u);

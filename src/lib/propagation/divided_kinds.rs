@@ -43,7 +43,8 @@ static SMOOTH: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(10));
 /// The same for functions with a pole below zero, no nearer than 1/30: off by 10⁻⁹ of themselves.
 static RATIONAL: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
     const ENDS: [f64; 9] = [0.0, 0.1, 0.5, 2.0, 4.5, 8.0, 14.0, 24.0, 40.0];
-    let of_panel = |ends: &[f64]| panel(ends[0], ends[1]).map(|(t, weight)| (t, weight * (-t).exp())).collect::<Vec<_>>();
+    let of_panel =
+        |ends: &[f64]| panel(ends[0], ends[1]).map(|(t, weight)| (t, weight * (-t).exp())).collect::<Vec<_>>();
     let found: Vec<(f64, f64)> = ENDS.windows(2).flat_map(of_panel).filter(|(_, weight)| *weight > 1e-15).collect();
     let sum: f64 = found.iter().map(|(_, weight)| weight).sum();
     found.into_iter().map(|(t, weight)| (t, weight / sum)).collect()
@@ -136,5 +137,101 @@ impl Photosite {
     /// The sixth cumulant, a⁶/2 of each.
     pub(super) fn sixth_of_jumps(&self, found: &Quotients) -> f64 {
         0.5 * self.of_jumps(6, found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::masters::Flat;
+    use super::super::moments::{Equations, Prediction};
+    use super::*;
+    use crate::metadata::{AdcRecord, PoissonKind};
+    use crate::stages::noise::{LineNoise, NoiseModel};
+
+    /// A photosite over three flats; three dark frames came off it, and three of theirs off the flats.
+    fn divided(tails: Tails) -> Photosite {
+        let model = NoiseModel {
+            dark_e: 20.0,
+            dcnu: 0.1,
+            prnu: 0.01,
+            read_noise_e: 8.0,
+            full_well_e: 60_000.0,
+            dark_shot: true,
+            signal_shot: true,
+            poisson: PoissonKind::Exact,
+            lines: LineNoise::default(),
+            tails,
+        };
+        let site = Photosite::of_electrons(model, Equations::Exact)
+            .digitized(AdcRecord::new(14, 600.0, 0.25))
+            .less_dark_frames(3);
+        let flat = Flat {
+            expected_e: [9000.0; 3],
+            photosites: [1e4; 3],
+            counted_share: [1.0; 3],
+            frames: Dark::mean_of(model, 3),
+            levels: None,
+            darks: [Some(Dark::mean_of(model, 3)), None, None],
+            shares_masters: false,
+            level_lines: None,
+            levels_adu: [0.0; 2],
+        };
+        Photosite { flat: Some(flat), ..site }
+    }
+
+    const TAILS: Tails = Tails { hot_share: 0.03, hot_e: 90.0, rts_share: 0.1, rts_e: 15.0, trap_e: 0.0 };
+
+    /// Of next to none moments are those of photosites that are all alike: sensitivities are then summed by seven nodes, not fifty.
+    #[test]
+    fn next_to_no_tails_change_nothing() {
+        let few = Tails { hot_share: 1e-13, rts_share: 1e-13, ..TAILS };
+        for expected_e in [300.0, 9000.0, 20_000.0] {
+            let [none, with] = [Tails::default(), few].map(|tails| divided(tails).divided(1, expected_e).unwrap());
+            let values = |found: &Prediction| [found.moments.mean, found.moments.variance, found.third, found.common];
+            for (a, b) in values(&none).into_iter().zip(values(&with)) {
+                assert!((a / b - 1.0).abs() < 1e-9, "{expected_e}: {a} {b}");
+            }
+            assert_eq!((none.sixth, none.fourth()), (0.0, 0.0));
+        }
+    }
+
+    /// To first order hot photosites add the shot noise of their excess to frame and darks, and jumps a²/2 of mean square 2 s²: with n = 3
+    /// of each and x = E/F, K² [p h (1 + 1/3 + x² 2/3) + q s² (1 + 1/3 + x² 2/3)]; beyond it is a share ρ of 10⁻⁴ and that of (h/F)².
+    #[test]
+    fn tails_add_their_own_variance() {
+        let variance = |tails: Tails| divided(tails).divided(0, 6000.0).unwrap().moments.variance;
+        let plain = variance(Tails::default());
+        let x: f64 = 6000.0 / 9000.0;
+        let kept = 1.0 + 1.0 / 3.0 + x * x * 2.0 / 3.0;
+        for (tails, added) in [
+            (Tails { hot_share: 0.03, hot_e: 90.0, ..Tails::default() }, 0.03 * 90.0),
+            (Tails { rts_share: 0.1, rts_e: 15.0, ..Tails::default() }, 0.1 * 225.0),
+        ] {
+            let found = (variance(tails) - plain) / (0.25 * 0.25);
+            assert!((found / (added * kept) - 1.0).abs() < 2e-3, "{found} {}", added * kept);
+        }
+    }
+
+    /// ∫ e^(−t)/(1 + g t) dt by 60 nodes on each of 80 panels.
+    #[test]
+    fn panels_sum_rational_numbers() {
+        let cases = [
+            (0.1, 0.915_633_339_397_881, &*SMOOTH),
+            (1.0, 0.596_347_362_323_194, &*RATIONAL),
+            (3.0, 0.385_602_012_136_694, &*RATIONAL),
+            (30.0, 0.098_462_632_970_155, &*RATIONAL),
+        ];
+        for (g, expected, nodes) in cases {
+            let sum: f64 = nodes.iter().map(|(t, weight)| weight / (1.0 + g * t)).sum();
+            assert!((sum - expected).abs() < 1e-9, "{g}: {sum}");
+        }
+    }
+
+    /// Where a hot photosite in 10⁹ fills up nothing is told.
+    #[test]
+    fn tails_that_are_cut_off_are_refused() {
+        let told = |hot_e: f64| divided(Tails { hot_e, ..TAILS }).divided(0, 6000.0).is_some();
+        // 18 mean excesses are one in 2·10⁹ of three hundredths, and their squares count to 23.
+        assert!(told(1500.0) && !told(4000.0));
     }
 }

@@ -64,7 +64,6 @@ impl Photosite {
     ///
     /// n (dv/dγ)² s² > 0.06 · 2 v²        n photosites of a line, s the rms of its response
     fn gains_show(&self, expected_e: [f64; 3], geometry: &Geometry) -> bool {
-        const NEGLIGIBLE: f64 = 0.06;
         let (Some(adc), Some(flat)) = (&self.adc, &self.flat) else { return false };
         let noise = |class: usize, response: f64| {
             let site = [response, 1.0];
@@ -72,11 +71,27 @@ impl Photosite {
             let below = flat.drawn(adc, flat.expected_e[class], site);
             (above.variance + (above.mean / below.mean).powi(2) * below.variance) / (below.mean * below.mean)
         };
+        self.follows_gains(geometry, 2.0, noise)
+    }
+
+    /// The same of what is drawn anew in so many exposures that are divided by one flat field.
+    pub(super) fn gains_show_over(&self, expected_e: [f64; 3], geometry: &Geometry, frames: u32) -> bool {
+        let Some(adc) = self.adc.as_ref().filter(|_| self.flat.is_some()) else { return false };
+        let noise = |class: usize, response: f64| {
+            Drawn::codes(&self.model, adc, expected_e[class], [response, 1.0]).variance / (response * response)
+        };
+        self.follows_gains(geometry, 2.0 / f64::from(frames.max(2) - 1), noise)
+    }
+
+    /// Whether the noise of a class follows the response of its lines so much, beside a relative variance that chance leaves of that of one
+    /// photosite.
+    fn follows_gains(&self, geometry: &Geometry, chance: f64, noise: impl Fn(usize, f64) -> f64) -> bool {
+        const NEGLIGIBLE: f64 = 0.06;
         let along = [geometry.width, geometry.height].map(|length| length as f64);
         let shows = |axis: Axis, length: f64| {
             let [_, _, response] = axis.parts(&self.model.lines);
             let slope = |class: usize| noise(class, 1.0 + response) / noise(class, 1.0) - 1.0;
-            response > 0.0 && (0..3).any(|class| length * slope(class).powi(2) > NEGLIGIBLE * 2.0)
+            response > 0.0 && (0..3).any(|class| length * slope(class).powi(2) > NEGLIGIBLE * chance)
         };
         Axis::ALL.into_iter().zip(along).any(|(axis, length)| shows(axis, length))
     }

@@ -223,7 +223,13 @@ impl LevelLines {
         match (self.is_array, k == 1 || l == 1) {
             (false, _) => one,
             (true, true) => 0.5 * one,
-            (true, false) => if k == l { one } else { 0.0 },
+            (true, false) => {
+                if k == l {
+                    one
+                } else {
+                    0.0
+                }
+            }
         }
     }
 }

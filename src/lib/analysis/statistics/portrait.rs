@@ -303,7 +303,9 @@ impl Foreseen {
                 let lines = |count: usize| if share < 0.5 { (count as f64 / 2.0).max(1.0) } else { count as f64 };
                 let mean_std = |[columns, rows]: [usize; 2]| {
                     let own = (variance - row - column) / (share * (columns * rows) as f64);
-                    (own + row / lines(rows) + column / lines(columns) + class.common + class.lines.level[index]).max(0.0).sqrt()
+                    (own + row / lines(rows) + column / lines(columns) + class.common + class.lines.level[index])
+                        .max(0.0)
+                        .sqrt()
                 };
                 let correlation = |shared: f64| vec![if shared > 0.0 { shared / variance } else { 0.0 }; LAGS];
                 Self {

@@ -334,7 +334,17 @@ impl<S: RowSource> FlatFrames<S> {
         let full = full.iter().sum();
         let share = |class: usize| Some(tally.scatter(class)? / means[class]).filter(|_| counts[class] > 0);
         let scatter = (0..self.classes.count()).filter_map(share).fold(0.0, f64::max);
-        Ok(FlatMeans { means, photosites: counts.clone(), left_out, cell_lines, full, scatter, limits, illumination, doubt })
+        Ok(FlatMeans {
+            means,
+            photosites: counts.clone(),
+            left_out,
+            cell_lines,
+            full,
+            scatter,
+            limits,
+            illumination,
+            doubt,
+        })
     }
 
     /// What is wrong with the array that they are said to be behind, Bayer or none, or that nothing tells, where what photosites scatter by

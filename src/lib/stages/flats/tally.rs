@@ -98,3 +98,21 @@ impl Tally {
         Some(Places { signal, variance: self.places.map(|(_, count)| largest * largest / count) })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Geometry;
+
+    /// Three rows of four, four and two whole cells: 10²/36 rows; columns of three, three, two and two: 10²/26.
+    #[test]
+    fn lines_of_unlike_many_cells_count_as_fewer() {
+        let mut tally = Tally::new(1, Blocks::of(&Geometry::new(8, 6, &["Y"]), 1));
+        assert_eq!(tally.cell_lines(), None);
+        for whole in [[true; 4], [true; 4], [true, true, false, false]] {
+            tally.whole = whole.to_vec();
+            tally.take_line();
+        }
+        assert_eq!(tally.cell_lines(), Some([100.0 / 36.0, 100.0 / 26.0]));
+    }
+}
