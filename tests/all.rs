@@ -13,6 +13,7 @@ mod corrected_transfer;
 mod correction;
 mod corrections;
 mod described;
+mod divided;
 mod dng;
 mod doubts;
 mod drift;

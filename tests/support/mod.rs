@@ -9,6 +9,7 @@ pub mod chain;
 pub mod cmos;
 pub mod dng;
 pub mod fits;
+pub mod kit;
 pub mod makers;
 pub mod misses;
 pub mod photon_transfer;

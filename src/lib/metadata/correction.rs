@@ -301,6 +301,9 @@ pub struct FlatRecord {
     /// Good photosites of each class beside these.
     #[serde(default, skip_serializing_if = "is_none_left")]
     pub left_out: Vec<u64>,
+    /// How many rows of cells these are, and how many columns: (Σ n)²/Σ n² of n cells in each.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cell_lines: Option<[f64; 2]>,
     /// Whether the metadata of all its frames say that they were lit evenly.
     pub even: bool,
     /// How they were lit, where that is not so.

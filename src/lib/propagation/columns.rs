@@ -29,17 +29,36 @@ const UNEVEN: &str = "the smear of columns with red photosites and of those with
 /// Why nothing is predicted of another array's mosaic.
 const OF_ANOTHER: &str = "it is behind another filter array than its sensor has, by which its columns have smear";
 
-/// Why nothing is predicted over a flat field.
-const DIVIDED: &str = "it was divided by a flat field of a sensor with smear, in which columns with red photosites and those with blue \
-                       ones may differ";
+/// Why nothing is predicted over a flat field of unknown smear.
+const UNTIMED: &str = "it was divided by a flat field of a sensor with smear, and nothing tells the exposure of the flats, by which that goes; \
+                       correct the frame with flats whose metadata tell it";
 
 /// What photosites expect with smear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Smeared {
     /// Electrons of R, G and B, means over the columns that have them.
     pub expected_e: [f64; 3],
-    /// What the columns of a class are off its mean by, e⁻.
+    /// What even columns are off the mean of all by, e⁻.
     off_e: f64,
+    /// The columns of the flat field by which it was divided.
+    of_flat: Option<FlatColumns>,
+}
+
+/// Columns of flats with smear.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct FlatColumns {
+    /// The share of the light of each photosite of a column that all others take.
+    share: f64,
+    pattern: CfaPattern,
+    rows: u32,
+}
+
+impl FlatColumns {
+    /// What even columns are off the mean by, e⁻, of so much light.
+    fn off_e(&self, expected_e: [f64; 3]) -> f64 {
+        let [even, odd] = uniform_columns(self.pattern, self.rows, expected_e);
+        0.5 * self.share * (even - odd)
+    }
 }
 
 impl Smeared {
@@ -47,10 +66,7 @@ impl Smeared {
     pub fn of(frame: &FrameHeader, expected_e: [f64; 3]) -> Predicted<Self> {
         let share = frame.metadata.noise.as_ref().map_or(0.0, |noise| noise.smear_per_row);
         if share <= 0.0 {
-            return Ok(Self { expected_e, off_e: 0.0 });
-        }
-        if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
-            return Err(Unpredictable::Beyond(DIVIDED));
+            return Ok(Self { expected_e, off_e: 0.0, of_flat: None });
         }
         let sensor = frame.metadata.sensor.as_ref().ok_or(Unpredictable::Missing("sensor"))?;
         let readout = sensor.readout.as_ref().ok_or(Unpredictable::Missing("sensor.readout"))?;
@@ -67,13 +83,29 @@ impl Smeared {
                 with[class as usize] = expected_e[class as usize] + smear[column_of(pattern, class)];
             }
         }
-        Ok(Self { expected_e: with, off_e: (smear[0] - smear[1]).abs() / 2.0 })
+        let of_flat = match frame.metadata.correction.as_ref().and_then(|correction| correction.flat.as_ref()) {
+            Some(flat) => {
+                let exposure_s = flat.exposure_s.filter(|exposure_s| *exposure_s > 0.0);
+                let exposure_s = exposure_s.ok_or(Unpredictable::Beyond(UNTIMED))?;
+                Some(FlatColumns { share: readout.smear_line_s / exposure_s, pattern, rows: readout.height })
+            }
+            None => None,
+        };
+        Ok(Self { expected_e: with, off_e: (smear[0] - smear[1]) / 2.0, of_flat })
     }
 
-    /// Makes sure that photosites of a class are alike next to their noise; `slope` samples to an electron.
-    pub fn check_even(&self, slope: f64, classes: &[Prediction; 3]) -> Predicted<()> {
-        let is_alike = |class: &Prediction| self.off_e * slope <= ALIKE * class.moments.std();
-        if self.off_e == 0.0 || classes.iter().all(is_alike) { Ok(()) } else { Err(Unpredictable::Beyond(UNEVEN)) }
+    /// Makes sure that photosites of a class are alike next to their noise: of a frame, or over a flat field whose columns differ too, or do
+    /// not where smear was left out of it.
+    pub fn check_even(&self, photosite: &Photosite, classes: &[Prediction; 3]) -> Predicted<()> {
+        let off_e = |k: usize| match self.of_flat.zip(photosite.flat) {
+            Some((columns, flat)) => {
+                let in_both = self.off_e - self.expected_e[k] / flat.expected_e[k] * columns.off_e(flat.expected_e);
+                self.off_e.abs().max(in_both.abs())
+            }
+            None => self.off_e.abs(),
+        };
+        let is_alike = |k: usize| off_e(k) * photosite.slope() <= ALIKE * classes[k].moments.std();
+        if (0..3).all(|k| off_e(k) == 0.0 || is_alike(k)) { Ok(()) } else { Err(Unpredictable::Beyond(UNEVEN)) }
     }
 }
 

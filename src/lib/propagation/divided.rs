@@ -1,9 +1,12 @@
 //! Moments of photosites that were divided by a flat field.
 
 use super::charge::{charge, sensitivities};
+use super::divided_kinds::CUT_OFF;
 use super::masters::{Dark, Drawn, Flat};
 use super::moments::{LineCovariance, Prediction};
 use super::photosite::Photosite;
+use super::quotients::{Quotients, few_sensitivities};
+use super::tails::mixture;
 use super::unlike::{Temporal, Unlike, UnlikeSums};
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::metadata::AdcRecord;
@@ -15,7 +18,7 @@ const NARROW: &str = "what was divided by a flat field, or the flat field, reach
                                  scatters over less than a code";
 /// The same of a converter that is not straight.
 const BENT: &str = "it was divided by a flat field, and the curve of its converter (`linearization`) is in both: what it makes of the quotient is not \
-                    predicted";
+                    predicted; correct it with `--linearize`";
 
 /// Why nothing is said of samples that were divided by noise.
 pub(super) const NOISY: &str = "the flat field is so noisy that what is divided by it follows no series here (standard deviations beyond \
@@ -33,12 +36,17 @@ struct Limits {
     /// The share of photosites at most that are noisier, and left out: what they, which their dark signal leaves hardly any light, make
     /// of the light is no ordinary pixel.
     left_out: f64,
+    /// What the series may leave out of the variance at photosites that are unlike most, and noisier.
+    lost: f64,
 }
 
 /// Where the series is good to 10⁻³.
-const STRICT: Limits = Limits { noise: 0.01, left_out: 0.0 };
+const STRICT: Limits = Limits { noise: 0.01, left_out: 0.0, lost: 1e-6 };
 /// Where it is good to a few hundredths, and a normal flat field near zero, 4.5 standard deviations off, adds as little.
-const WIDE: Limits = Limits { noise: 0.05, left_out: 0.01 };
+const WIDE: Limits = Limits { noise: 0.05, left_out: 0.01, lost: 0.01 };
+
+/// The relative variance of a flat field beyond which no photosite is followed.
+const MOST_NOISE: f64 = 0.1;
 
 impl Photosite {
     /// Moments of the class R, G or B after division by the flat field: with A what is left of the codes and F the flat
@@ -61,18 +69,72 @@ impl Photosite {
 
     /// The same of flat fields within such limits.
     fn divided_within(&self, class: usize, expected_e: f64, limits: Limits) -> Option<(Prediction, Temporal)> {
-        let (adc, flat) = (self.adc?, self.flat?);
-        let light_e = flat.expected_e[class];
-        if !self.is_all_open(&adc, &flat, [expected_e, light_e]) {
+        let flat = self.flat?;
+        if !self.is_all_open(class, expected_e) || !self.are_tails_open(class, expected_e) {
             return None;
         }
+        let (mut all, mut unlike) = (Quotients::default(), UnlikeSums::default());
+        let mut parts = Vec::new();
+        for kind in self.kinds_divided(class, expected_e) {
+            let found = kind.site.quotients(class, expected_e, (kind.share, kind.is_rare), limits, &mut unlike)?;
+            if found.weight > 0.0 {
+                parts.push((
+                    found.weight,
+                    found.law(kind.site.fourth_of_jumps(&found), kind.site.sixth_of_jumps(&found)),
+                ));
+            }
+            all.take(&found);
+        }
+        if all.left_out > limits.left_out * (all.weight + all.left_out) {
+            return None;
+        }
+        let [first, square, scale, third, above, of_flat] = all.means();
+        if all.lost > limits.lost * (square - first * first) * all.weight {
+            return None;
+        }
+        let mean = first * scale;
+        let variance = ((square - first * first) * scale * scale).max(0.0);
+        // ⟨F⟩ is a mean over as many photosites, the same patterns and the same noise as A/F:
+        // cov(F, A/F) = E A − E F E[A/F], of those that ⟨F⟩ counts.
+        let of_both = 2.0 * scale * first * (above - scale * first);
+        let off = flat.counted_share[class] * of_both + first * first * (of_flat - scale * scale);
+        let prediction = if self.has_tails() {
+            parts.iter_mut().for_each(|(weight, _)| *weight /= all.weight);
+            mixture(&parts).scaled(scale)
+        } else {
+            Prediction::of_cumulants(mean, variance, third * scale.powi(3), 0.0)
+        };
+        let (anew, unlike) = unlike.found();
+        let unlike = Unlike { spread: unlike.spread + all.of_flat_noise / all.weight, of_means: None, ..unlike };
+        let square = scale * scale;
+        let temporal = Temporal {
+            variance: anew * square,
+            rounding: all.rounding / all.weight * square,
+            unlike: (!self.has_tails()).then(|| unlike.scaled(scale)),
+            single: [0.0; 2],
+            lines: LineCovariance::default(),
+        };
+        Some((Prediction { common: off / flat.photosites[class].max(1.0), ..prediction }, temporal))
+    }
+
+    /// Sums over the sensitivities of photosites that are alike but for these, of such a share of all, and whether they are so few that
+    /// none counts whose flat field is too noisy.
+    fn quotients(
+        &self,
+        class: usize,
+        expected_e: f64,
+        (share, is_rare): (f64, bool),
+        limits: Limits,
+        unlike: &mut UnlikeSums,
+    ) -> Option<Quotients> {
+        let (adc, flat) = (self.adc?, self.flat?);
+        let light_e = flat.expected_e[class];
         let in_both: Vec<[Dark; 2]> = flat.in_both(&self.darks).collect();
-        let [lights, darks] = [self.model.response(), self.model.dcnu].map(sensitivities);
-        let mut sums = [0.0; 7];
-        let mut left_out = 0.0;
-        let (mut unlike, mut of_flat_noise, mut rounding) = (UnlikeSums::default(), 0.0, 0.0);
+        let [lights, darks] = [self.model.response(), self.model.dcnu]
+            .map(|sigma| if share == 1.0 { sensitivities(sigma) } else { few_sensitivities(sigma) });
+        let mut found = Quotients::default();
         for (&(x, of_x), &(u, of_u)) in lights.iter().flat_map(|x| darks.iter().map(move |u| (x, u))) {
-            let site = [x, u];
+            let (site, weight) = ([x, u], share * of_x * of_u);
             let drawn = Drawn::codes(&self.model, &adc, expected_e, site);
             let mut above = drawn.less(&self.darks, &adc, site);
             let below = flat.drawn(&adc, light_e, site);
@@ -83,8 +145,8 @@ impl Photosite {
             }
             let f = below.mean;
             let (rho, skew) = (below.variance / (f * f), below.third / f.powi(3));
-            if rho > limits.noise {
-                left_out += of_x * of_u;
+            if rho > limits.noise && (share == 1.0 || is_rare || rho > MOST_NOISE) {
+                found.left_out += if is_rare { 0.0 } else { weight };
                 continue;
             }
             let of_both = |[a, b]: &[Dark; 2]| a.weight * b.weight * a.drawn(&adc, 0.0, site).variance;
@@ -95,47 +157,27 @@ impl Photosite {
             let square = ((above.mean.powi(2) + above.variance) * of_square - 4.0 * above.mean * both) / (f * f);
             // Third cumulant of the quotient, of its own noise and of the curvature of 1/F.
             let noise = above.variance / (f * f);
+            if rho > limits.noise {
+                found.lost += weight * 105.0 * rho.powi(3) * (first * first + noise);
+            }
             let offset = self.offsets_left(&adc, &flat, above.mean / f) / (f * f);
             let square = square + offset;
             let third = (above.third - above.mean.powi(3) * skew) / f.powi(3)
                 + 6.0 * first * rho * (noise + first * first * rho);
             let anew = drawn.variance * of_square / (f * f);
-            unlike.add(of_x * of_u, [first, anew, drawn.third / f.powi(3), 0.0]);
-            of_flat_noise += of_x * of_u * 4.0 * rho * anew * anew;
-            rounding += of_x * of_u * adc.rounding_at(x * expected_e + u * self.model.dark_e) * of_square / (f * f);
-            let of_flat = f * f + below.variance;
-            for (sum, value) in sums.iter_mut().zip([1.0, first, square, f, third, above.mean, of_flat]) {
-                *sum += of_x * of_u * value;
-            }
+            unlike.add(weight, [first, anew, drawn.third / f.powi(3), 0.0]);
+            found.of_flat_noise += weight * 4.0 * rho * anew * anew;
+            found.rounding += weight * adc.rounding_at(x * expected_e + u * self.model.dark_e) * of_square / (f * f);
+            found.add(weight, [first, square, f, third, above.mean, f * f + below.variance]);
         }
-        let [weight, sums @ ..] = sums;
-        if left_out > limits.left_out * (weight + left_out) {
-            return None;
-        }
-        let [first, square, scale, third, above, of_flat] = sums.map(|sum| sum / weight);
-        let mean = first * scale;
-        let variance = ((square - first * first) * scale * scale).max(0.0);
-        // ⟨F⟩ is a mean over as many photosites, the same patterns and the same noise as A/F:
-        // cov(F, A/F) = E A − E F E[A/F], of those that ⟨F⟩ counts.
-        let of_both = 2.0 * scale * first * (above - scale * first);
-        let off = flat.counted_share[class] * of_both + first * first * (of_flat - scale * scale);
-        let prediction = Prediction::of_cumulants(mean, variance, third * scale.powi(3), 0.0);
-        let (anew, unlike) = unlike.found();
-        let unlike = Unlike { spread: unlike.spread + of_flat_noise / weight, of_means: None, ..unlike };
-        let square = scale * scale;
-        let temporal = Temporal {
-            variance: anew * square,
-            rounding: rounding / weight * square,
-            unlike: Some(unlike.scaled(scale)),
-            single: [0.0; 2],
-            lines: LineCovariance::default(),
-        };
-        Some((Prediction { common: off / flat.photosites[class].max(1.0), ..prediction }, temporal))
+        Some(found)
     }
 
-    /// Whether codes of the frame, of its flats and of what came off both, at so many electrons in frame and flats, are charge and a
-    /// uniform error.
-    fn is_all_open(&self, adc: &AdcRecord, flat: &Flat, [expected_e, light_e]: [f64; 2]) -> bool {
+    /// Whether codes of the frame, of its flats and of what came off both, at so many electrons in the frame, are charge and a uniform
+    /// error.
+    pub(super) fn is_all_open(&self, class: usize, expected_e: f64) -> bool {
+        let (Some(adc), Some(flat)) = (&self.adc, &self.flat) else { return false };
+        let light_e = flat.expected_e[class];
         let is_smooth = |dark: &Dark, expected_e: f64| self.of_dark(dark).is_smooth(dark, adc, expected_e);
         let mut averages = self.darks.iter().chain(&flat.darks).flatten();
         self.is_open(adc, expected_e)
@@ -177,9 +219,11 @@ impl Photosite {
         if self.adc.is_some_and(|adc| adc.is_bent()) {
             return Unpredictable::Beyond(BENT);
         }
-        let is_open =
-            |(adc, flat): (AdcRecord, Flat)| self.is_all_open(&adc, &flat, [expected_e, flat.expected_e[class]]);
-        Unpredictable::Beyond(if self.adc.zip(self.flat).is_some_and(is_open) { NOISY } else { NARROW })
+        Unpredictable::Beyond(match self.is_all_open(class, expected_e) {
+            false => NARROW,
+            true if !self.are_tails_open(class, expected_e) => CUT_OFF,
+            true => NOISY,
+        })
     }
 
     /// The variance after division by the flat field; where [`Self::divided`] gives none, to second order at the mean sensitivities: that
@@ -188,10 +232,13 @@ impl Photosite {
         if let Some(divided) = self.divided(class, expected_e) {
             return divided.moments.variance;
         }
-        let own = self.moments(expected_e).moments.variance;
         if let Some((divided, _)) = self.divided_within(class, expected_e, WIDE) {
             return divided.moments.variance;
         }
+        let own = match self.has_tails() {
+            true => self.variance_by_few(expected_e),
+            false => self.moments(expected_e).moments.variance,
+        };
         let (Some(adc), Some(flat)) = (self.adc, self.flat) else { return own };
         let below = flat.drawn(&adc, flat.expected_e[class], [1.0; 2]);
         let level = expected_e * adc.adu_per_e;
@@ -222,11 +269,12 @@ impl Photosite {
         let rounding = adc.rounding_at(expected_e + self.model.dark_e);
         let temporal = Drawn::codes(&self.model, adc, expected_e, [1.0; 2]).variance - rounding;
         let read_e = self.model.added();
-        let reach_e = REACH * (of_charge.variance + read_e * read_e).sqrt();
+        let jump_e = self.model.tails.trap_e;
+        let reach_e = REACH * (of_charge.variance + read_e * read_e).sqrt() + jump_e;
         let level = |charge_e: f64| adc.level_at(charge_e);
         !adc.is_bent()
             && temporal.sqrt() >= LEAST_CODES
-            && level((of_charge.mean - reach_e).max(-REACH * read_e)) > 0.0
+            && level((of_charge.mean - reach_e).max(-REACH * read_e - jump_e)) > 0.0
             && level(of_charge.mean + reach_e) < f64::from(adc.top_code())
             && of_charge.mean + REACH * of_charge.variance.sqrt() < self.model.full_well_e
     }

@@ -73,7 +73,10 @@ impl Photosite {
     /// n (v(u) − v)² > 0.06 · 2 v²/(N − 1)        v the variance over exposures, u the rms of what a line has, n photosites of a line
     fn hangs_on_lines(&self, expected_e: [f64; 3], geometry: &Geometry, frames: u32) -> bool {
         const NEGLIGIBLE: f64 = 0.06;
-        let Some(adc) = self.adc.filter(|_| !self.has_tails() && self.flat.is_none()) else { return false };
+        if self.flat.is_some() {
+            return self.gains_show_over(expected_e, geometry, frames);
+        }
+        let Some(adc) = self.adc.filter(|_| !self.has_tails()) else { return false };
         let model = NoiseModel { lines: without_fixed(self.model.lines), ..self.model };
         let of = |class: usize, offset_e: f64, gain: f64| {
             let adc = AdcRecord { bias_adu: adc.bias_adu + adc.adu_per_e * offset_e, ..adc };

@@ -190,6 +190,8 @@ impl Sites {
                 return Err(Unpredictable::Beyond("charge transfer before rows and columns that share noise"));
             }
             moments.iter_mut().zip(lines).for_each(|(moments, lines)| moments.lines = lines);
+            let levels = photosite.level_covariance(expected_e);
+            moments.iter_mut().zip(levels).for_each(|(moments, level)| moments.lines.level = level);
             if frame.geometry.channels.len() == 3 && frame.metadata.demosaic.is_none() {
                 let beyond = photosite.beyond_lines(expected_e, &lines)?;
                 moments.iter_mut().zip(beyond).for_each(|(moments, together)| moments.lines.together = together);
@@ -203,7 +205,7 @@ impl Sites {
                 Self { moments: photosite.averaged(moments, expected_e, &average)?, ..sites }
             }
         };
-        ground.smeared.check_even(photosite.slope(), &sites.moments)?;
+        ground.smeared.check_even(&photosite, &sites.moments)?;
         Ok(sites)
     }
 

@@ -69,7 +69,7 @@ impl<'a> Ground<'a> {
             _ => return Err(Unpredictable::Beyond("only electrons, ADU and what is made of them are predicted")),
         };
         photosite.check_lines(true)?;
-        photosite.check_level()?;
+        photosite.check_level(expected_e, &frame.geometry)?;
         Ok(Self { frame, photosite, smeared, quantity })
     }
 

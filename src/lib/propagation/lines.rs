@@ -59,10 +59,6 @@ const OFFSETS_SHOW: &str = "photosites have fixed offsets, and the noise of the 
                             what they leave of these hang on where in a code each mean lies; more of them do not help, amplification \
                             before the converter does";
 
-/// Why nothing is said of samples over a flat field.
-const NORMALIZED: &str = "it was divided by a flat field whose rows or columns share noise or gains, and how far these move its level \
-                          is not predicted";
-
 /// Why nothing is said of a drift that codes follow on a curve.
 const DRIFT_CUT: &str = "its black level drifts along rows, and full well, an end of the codes or a step of them cuts what rows share \
                          by that";
@@ -133,10 +129,15 @@ fn anew_apart(model: &NoiseModel) -> NoiseModel {
 }
 
 impl Photosite {
+    /// All averages that its samples follow from.
+    pub(super) fn averages(&self) -> impl Iterator<Item = &Dark> {
+        let flat = self.flat.iter().flat_map(|flat| std::iter::once(&flat.frames).chain(flat.darks.iter().flatten()));
+        self.darks.iter().flatten().chain(flat)
+    }
+
     /// All models of noise that its samples follow from.
     pub(super) fn models(&self) -> impl Iterator<Item = &NoiseModel> {
-        let flat = self.flat.iter().flat_map(|flat| std::iter::once(&flat.frames).chain(flat.darks.iter().flatten()));
-        std::iter::once(&self.model).chain(self.darks.iter().flatten().chain(flat).map(|dark| &dark.model))
+        std::iter::once(&self.model).chain(self.averages().map(|dark| &dark.model))
     }
 
     /// Makes sure that formulas are known for what rows and columns share, and for fixed offsets, at a level that is known to a fraction of a
@@ -152,10 +153,8 @@ impl Photosite {
         if self.equations == Equations::Paper {
             return Err(Unpredictable::Beyond(NOT_IN_THE_PAPER));
         }
-        let flat = self.flat.iter().flat_map(|flat| std::iter::once(&flat.frames).chain(flat.darks.iter().flatten()));
-        let mut averages = self.darks.iter().flatten().chain(flat);
         let is_shared = |dark: &Dark| Axis::ALL.iter().any(|axis| axis.parts(&dark.model.lines)[0] > 0.0);
-        if averages.any(|dark| is_shared(dark) && dark.frames > 2 && dark.combine != Combine::Mean) {
+        if self.averages().any(|dark| is_shared(dark) && dark.frames > 2 && dark.combine != Combine::Mean) {
             return Err(Unpredictable::Beyond(NO_MEANS));
         }
         let Some(adc) = self.adc else { return Ok(()) };
@@ -171,16 +170,6 @@ impl Photosite {
             return Err(Unpredictable::Beyond(OFFSETS_SHOW));
         }
         Ok(())
-    }
-
-    /// Makes sure that the level of the flat field is as sure as its photosites are many.
-    ///
-    /// # Errors
-    ///
-    /// [`Unpredictable::Beyond`].
-    pub(super) fn check_level(&self) -> Predicted<()> {
-        let is_shared = self.flat.is_some() && self.has_lines();
-        if is_shared { Err(Unpredictable::Beyond(NORMALIZED)) } else { Ok(()) }
     }
 
     /// Whether photosites of a row or of a column share anything.
@@ -263,7 +252,7 @@ impl Photosite {
             column: of_class(column, k),
             drift: [0, 1, 2].map(|l| drift * slopes[k] * slopes[l]),
             drift_rows,
-            together: [0.0; 3],
+            ..LineCovariance::default()
         })
     }
 
@@ -369,9 +358,11 @@ impl Photosite {
 
     /// R of the straight codes, of such slopes.
     fn straight(&self, axis: Axis, expected_e: [f64; 3], [of_offsets, of_gains]: [[f64; 3]; 2]) -> Matrix3<f64> {
+        if let Some(shared) = self.shared_by_quotients(axis, expected_e) {
+            return Matrix3::from_fn(|k, l| of_offsets[k] * of_offsets[l] * shared[(k, l)]);
+        }
         let terms = self.terms(axis);
-        let x = self.line_signals(expected_e);
-        let at = |k: usize| (x[k], [of_offsets[k], of_gains[k]]);
+        let at = |k: usize| (expected_e[k], [of_offsets[k], of_gains[k]]);
         Matrix3::from_fn(|k, l| terms.between(at(k), at(l)))
     }
 
@@ -428,9 +419,9 @@ pub(super) type Site = (f64, [f64; 2]);
 /// What two photosites of signals x and y in one row, or column, share, in e²: a + b (x + y) + c x y.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LineTerms {
-    constant: f64,
-    linear: f64,
-    square: f64,
+    pub constant: f64,
+    pub linear: f64,
+    pub square: f64,
 }
 
 impl LineTerms {

@@ -201,8 +201,37 @@ pub struct Flat {
     pub darks: [Option<Dark>; MOST_DARKS],
     /// Whether what came off them came off the frame that is divided too.
     pub shares_masters: bool,
+    /// How many lines of cells its level is of; none where that is not recorded.
+    pub level_lines: Option<LevelLines>,
     /// What came off as a level, beyond the bias of the converter, ADU: of the frame that is divided, and of the flat field.
     pub levels_adu: [f64; 2],
+}
+
+/// The lines of cells that the level of a flat field is the mean of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelLines {
+    /// Rows and columns.
+    pub lines: [f64; 2],
+    /// Whether cells are those of a filter array, so that red and blue photosites share none; planes share all.
+    pub is_array: bool,
+}
+
+impl LevelLines {
+    /// What the means of two classes R, G and B have in common of what each row has by itself (0), or each column (1): Σ w w′ over lines.
+    pub(super) fn shared(&self, axis: usize, [k, l]: [usize; 2]) -> f64 {
+        let one = self.lines[axis].recip();
+        match (self.is_array, k == 1 || l == 1) {
+            (false, _) => one,
+            (true, true) => 0.5 * one,
+            (true, false) => {
+                if k == l {
+                    one
+                } else {
+                    0.0
+                }
+            }
+        }
+    }
 }
 
 /// Cumulants of what is drawn anew at one photosite.
@@ -269,9 +298,12 @@ impl Flat {
         let left_out = record.left_out.iter().map(|count| *count as f64).chain(std::iter::repeat(0.0));
         let counted: Vec<f64> = photosites.iter().zip(left_out).map(|(n, left)| n / (n + left).max(1.0)).collect();
         let darks = Dark::all(frame, &record.masters, of_sensor)?;
+        let is_green = |channel: &String| channel == "G";
+        let are_planes = record.means_adu.len() == 1
+            || frame.metadata.demosaic.is_none() && frame.geometry.channels.iter().any(is_green);
         let level_adu = record.black_adu.map_or(0.0, |black| black - adc.bias_adu);
         // What dark signal is left in the means is no light.
-        let dark_e = |model: &NoiseModel| model.dark_e * sensitivity(model.dcnu).0;
+        let dark_e = |model: &NoiseModel| model.dark_e * sensitivity(model.dcnu).0 + model.tails.mean_hot_e();
         let off_e: f64 = darks.iter().flatten().map(|dark| dark.weight * dark_e(&dark.model)).sum();
         let left_e = dark_e(&model) - off_e - level_adu / adc.adu_per_e;
         let light_e = |mean: f64| (mean / adc.adu_per_e - left_e) / sensitivity(model.response()).0;
@@ -283,6 +315,7 @@ impl Flat {
             levels: (record.levels.len() > 1).then(|| leveled(combine, clip.unwrap_or(CLIP), &record.levels)),
             darks,
             shares_masters: record.shares_masters,
+            level_lines: record.cell_lines.map(|lines| LevelLines { lines, is_array: !are_planes }),
             levels_adu: [0.0, level_adu],
         })
     }

@@ -84,6 +84,15 @@ impl Prediction {
         ]
     }
 
+    /// The same of samples that are so many times as large, that share nothing.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        let MeanVariance { mean, variance } = self.moments;
+        let square = factor * factor;
+        let (third, fourth) = (self.third * factor.powi(3), self.fourth() * square * square);
+        let scaled = Self::of_cumulants(factor * mean, square * variance, third, fourth);
+        Self { sixth: self.sixth * square.powi(3), ..scaled }
+    }
+
     /// Fourth cumulant.
     pub fn fourth(&self) -> f64 {
         self.excess_kurtosis * self.moments.variance.powi(2)
@@ -109,6 +118,9 @@ pub struct LineCovariance {
     pub drift_rows: f64,
     /// Of three planes: what samples of one place share with one of another class beyond what they do by row and by column.
     pub together: [f64; 3],
+    /// What all samples in a frame are off together with all of another class, beyond [`Prediction::common`]: rows and columns share noise
+    /// of the level of a flat field.
+    pub level: [f64; 3],
 }
 
 impl LineCovariance {
@@ -122,8 +134,14 @@ impl LineCovariance {
             drift: less(self.drift, part.drift),
             drift_rows: self.drift_rows,
             together: less(self.together, part.together),
+            level: less(self.level, part.level),
         }
     }
+}
+
+/// Covariance of what all samples of R, G and B in a frame are off together.
+pub fn common(sites: &[Prediction; 3]) -> Matrix3<f64> {
+    Matrix3::from_diagonal(&sites.map(|site| site.common).into()) + Matrix3::from_fn(|k, l| sites[k].lines.level[l])
 }
 
 /// The covariance of photosites: what each has by itself, and what those of a row and of a column share, by classes.

@@ -20,7 +20,7 @@ use super::drift_sampling::DriftSums;
 use super::line_sampling::{Local, Nonlocal};
 use super::mixed_pixel::{Pixel, pixels_of};
 use super::moments::Prediction;
-use super::moments::{LineCovariance, SiteCovariance};
+use super::moments::{LineCovariance, SiteCovariance, common};
 pub use super::place::Place;
 use super::place::{add_products, steps};
 use crate::numerics::normal::MeanVariance;
@@ -57,8 +57,7 @@ impl Sampling {
             };
         }
         let covariance = Matrix3::from_diagonal(&variances.into());
-        let common = Matrix3::from_diagonal(&classes.map(|class| class.common).into());
-        Self { count, mean_covariance: covariance / count + common, covariance, spread, variance_thirds: None }
+        Self { count, mean_covariance: covariance / count + common(classes), covariance, spread, variance_thirds: None }
     }
 
     /// Of a rectangle of demosaicked pixels with `weights` on photosites of such moments; where rows drift, the place has them on the sensor.

@@ -17,7 +17,7 @@ use super::charge::charge;
 use super::effort;
 use super::law::Law;
 use super::line_means::Kinds;
-use super::masters::Dark;
+use super::masters::{Dark, Flat, MOST_DARKS};
 use super::memory::Memory;
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
@@ -37,8 +37,9 @@ pub(super) const TRANSFERRED: &str = "charge transfer spreads hot pixels over th
 const NO_MEANS: &str = "medians and clipped means of frames with hot pixels or random telegraph signals follow no formula here; use \
                         `--combine mean`";
 
-/// Why nothing is said of samples over a flat field.
-const DIVIDED: &str = "it was divided by a flat field of a sensor that has hot pixels or random telegraph signals";
+/// Why nothing is said of frames some of whose noise is left out.
+const UNLIKE_FRAMES: &str = "hot pixels, random telegraph signals or DCNU are left out of the frame, or of a frame that it was corrected by, and not \
+                             of the others; draw all with the same `--without`";
 
 /// Why nothing is said of codes that are not straight.
 const BENT: &str = "hot pixels or random telegraph signals before a converter that is not straight";
@@ -59,9 +60,9 @@ const MOST_WORK: u64 = 8_000_000;
 
 /// What a kind of photosites has beyond others, in units of the means.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct State {
-    hot: f64,
-    trap: f64,
+pub(super) struct State {
+    pub hot: f64,
+    pub trap: f64,
 }
 
 /// What holds for a kind of photosites, and their share.
@@ -74,7 +75,7 @@ struct Kind<T> {
 }
 
 /// For photosites that are hot and have a trap: exact for polynomials of degree 9.
-static FEW: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(5));
+pub(super) static FEW: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| laguerre(5));
 
 impl NoiseModel {
     /// That of the photosites of one kind.
@@ -107,14 +108,15 @@ impl Photosite {
         if self.equations == Equations::Paper {
             return beyond(NOT_IN_THE_PAPER);
         }
-        if self.flat.is_some() {
-            return beyond(DIVIDED);
-        }
         if self.adc.is_some_and(|adc| adc.is_bent()) {
             return beyond(BENT);
         }
-        if self.darks.iter().flatten().any(|dark| dark.frames > 2 && dark.combine != Combine::Mean) {
+        if self.averages().any(|dark| dark.frames > 2 && dark.combine != Combine::Mean) {
             return beyond(NO_MEANS);
+        }
+        // What is divided scatters over codes, or is refused.
+        if self.flat.is_some() {
+            return if self.are_tails_alike() { Ok(()) } else { beyond(UNLIKE_FRAMES) };
         }
         let amplitude_e = self.most(|tails| tails.rts_e);
         let is_too_fine = |expected_e: f64| {
@@ -127,14 +129,34 @@ impl Photosite {
         Ok(())
     }
 
+    /// Whether each photosite has the same excess and amplitude, and the same DCNU, in all frames that its samples follow from.
+    fn are_tails_alike(&self) -> bool {
+        const NEXT_TO_NONE: f64 = 1e-6;
+        let alike = |of: fn(&NoiseModel) -> f64| {
+            let first = of(&self.model);
+            self.models().all(|model| (of(model) - first).abs() <= NEXT_TO_NONE * first.abs())
+        };
+        // Frames of next to no exposure have no dark signal to differ in.
+        let exposed = || self.models().filter(|model| model.dark_e + model.tails.hot_e > 0.0);
+        let excess = |model: &NoiseModel| model.tails.hot_e / (model.tails.hot_e + model.dark_e);
+        let first = exposed().next().map_or(0.0, excess);
+        alike(|model| model.tails.hot_share)
+            && alike(|model| model.tails.rts_share)
+            && alike(|model| model.tails.rts_e)
+            && alike(|model| model.dcnu)
+            && exposed().all(|model| (excess(model) - first).abs() <= NEXT_TO_NONE)
+    }
+
     /// The same photosites, those of one kind.
-    fn at(&self, state: &State) -> Self {
-        let darks = self.darks.map(|dark| dark.map(|dark| Dark { model: dark.model.at(state), ..dark }));
-        Self { model: self.model.at(state), darks, ..*self }
+    pub(super) fn at(&self, state: &State) -> Self {
+        let of = |dark: Dark| Dark { model: dark.model.at(state), ..dark };
+        let all = |darks: [Option<Dark>; MOST_DARKS]| darks.map(|dark| dark.map(of));
+        let flat = self.flat.map(|flat| Flat { frames: of(flat.frames), darks: all(flat.darks), ..flat });
+        Self { model: self.model.at(state), darks: all(self.darks), flat, ..*self }
     }
 
     /// That of the frames which have it.
-    fn most(&self, of: fn(&Tails) -> f64) -> f64 {
+    pub(super) fn most(&self, of: fn(&Tails) -> f64) -> f64 {
         self.models().map(|model| of(&model.tails)).fold(0.0, f64::max)
     }
 
@@ -455,7 +477,7 @@ fn central(prediction: &Prediction) -> [f64; 5] {
 }
 
 /// The law of a variable that has each of these with its weight.
-fn mixture(parts: &[(f64, Prediction)]) -> Prediction {
+pub(super) fn mixture(parts: &[(f64, Prediction)]) -> Prediction {
     let mean: f64 = parts.iter().map(|(weight, part)| weight * part.moments.mean).sum();
     let mut sums = [0.0; 5];
     for (weight, part) in parts {

@@ -118,6 +118,7 @@ impl Temporal {
             drift: less(one.lines.drift, self.lines.drift),
             drift_rows: one.lines.drift_rows,
             together: one.lines.together,
+            level: one.lines.level,
         };
         // Sixth cumulants mark photosites that are unlike each other.
         Prediction { sixth: one.sixth, common: one.common, lines, ..found }

@@ -10,9 +10,10 @@ use crate::frame::Geometry;
 use crate::numerics::normal::MeanVariance;
 use crate::propagation::covariance::PAIRS;
 use crate::propagation::drift::{Drift, DriftRows};
+use crate::propagation::moments::common;
 use crate::propagation::sampling::Sampling;
 use crate::propagation::{LineCovariance, Prediction, SiteCovariance};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// A grid of photosites: rows and columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,13 +135,9 @@ impl Array {
         let of_offsets = sum(&|at| offset(at) * with_all(at, &offset));
         let third = (1.0 - 1.0 / n) * sum(&|at| classes[class(at)].third * offset(at));
         let fourth = sum(&|at| classes[class(at)].fourth());
-        let common: f64 = [0, 1, 2]
-            .map(|k| {
-                let share = sum(&|at| if class(at) == k { 1.0 } else { 0.0 }) / n;
-                share * share * classes[k].common
-            })
-            .iter()
-            .sum();
+        let shares = [0, 1, 2].map(|k| sum(&|at| if class(at) == k { 1.0 } else { 0.0 }) / n);
+        let shares = Vector3::from(shares);
+        let common = shares.dot(&(common(classes) * shares));
         let variance = sum(&|at| classes[class(at)].moments.variance + offset(at).powi(2)) - total / n;
         let mut found = PlaneScatter {
             mean_variance: total / (n * n) + common,
@@ -185,7 +182,7 @@ fn without_drift(channels: &[Prediction; 3]) -> [Prediction; 3] {
 
 /// Three channels alike, all of a class.
 pub(super) fn alike(prediction: &Prediction, class: Class) -> [Prediction; 3] {
-    let LineCovariance { row, column, drift, drift_rows, .. } = prediction.lines;
+    let LineCovariance { row, column, drift, drift_rows, level, .. } = prediction.lines;
     let of_class = |shared: [f64; 3]| [shared[class as usize]; 3];
     let lines = LineCovariance {
         row: of_class(row),
@@ -193,6 +190,7 @@ pub(super) fn alike(prediction: &Prediction, class: Class) -> [Prediction; 3] {
         drift: of_class(drift),
         drift_rows,
         together: [0.0; 3],
+        level: of_class(level),
     };
     [Prediction { lines, ..*prediction }; 3]
 }
@@ -279,10 +277,9 @@ fn without_drift_sampling(channels: &[Prediction; 3], grids: &[Grid]) -> Samplin
             (normal + of_sites).max(0.0) / (free * free)
         })
     });
-    let common = Matrix3::from_diagonal(&channels.map(|channel| channel.common).into());
     Sampling {
         count,
-        mean_covariance: total / (count * count) + common,
+        mean_covariance: total / (count * count) + common(channels),
         covariance: (trace - total / count) / free,
         spread,
         variance_thirds: Some([0, 1, 2].map(|i| 8.0 * cube(i) / free.powi(3))),

@@ -3,6 +3,7 @@
 use super::region::Region;
 use crate::metadata::{AverageRecord, ExposuresRecord, FrameHeader};
 use crate::numerics::averages::Combine;
+use crate::propagation::moments;
 use crate::propagation::sampling::{Place, Sampling};
 use crate::propagation::{self, Equations, FramePrediction, PixelMoments, Unpredictable};
 use nalgebra::Matrix3;
@@ -126,6 +127,5 @@ impl Samplings {
 
 /// What all pixels are off together: each channel as the class that it is named for.
 fn common(mixture: &PixelMoments) -> Matrix3<f64> {
-    let classes = Matrix3::from_diagonal(&mixture.sites.map(|site| site.common).into());
-    mixture.from_camera * classes * mixture.from_camera.transpose()
+    mixture.from_camera * moments::common(&mixture.sites) * mixture.from_camera.transpose()
 }

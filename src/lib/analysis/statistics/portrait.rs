@@ -6,6 +6,7 @@ use super::region::Region;
 use crate::cfa::{Class, FilterArray};
 use crate::metadata::FrameHeader;
 use crate::numerics::normal::MeanVariance;
+use crate::propagation::moments::common;
 use crate::propagation::taps::pooled;
 use crate::propagation::{FramePrediction, PixelMoments, Prediction, gains};
 use crate::stream::{Passing, RowSource};
@@ -302,7 +303,9 @@ impl Foreseen {
                 let lines = |count: usize| if share < 0.5 { (count as f64 / 2.0).max(1.0) } else { count as f64 };
                 let mean_std = |[columns, rows]: [usize; 2]| {
                     let own = (variance - row - column) / (share * (columns * rows) as f64);
-                    (own + row / lines(rows) + column / lines(columns) + class.common).max(0.0).sqrt()
+                    (own + row / lines(rows) + column / lines(columns) + class.common + class.lines.level[index])
+                        .max(0.0)
+                        .sqrt()
                 };
                 let correlation = |shared: f64| vec![if shared > 0.0 { shared / variance } else { 0.0 }; LAGS];
                 Self {
@@ -345,8 +348,7 @@ impl Foreseen {
         let of = |covariance: Matrix3<f64>| covariance[(index, index)];
         let whole = of(gains::mean_pixel_covariance(weights, &site_covariance));
         let beyond = (mixture.covariance[(index, index)] - whole).max(0.0);
-        let common = sites.map(|site| site.common);
-        let common: f64 = (0..3).map(|class| mixture.from_camera[(index, class)].powi(2) * common[class]).sum();
+        let common = of(mixture.from_camera * common(sites) * mixture.from_camera.transpose());
         let correlation = |lag: [isize; 2]| {
             let phases = [0, 1, 2, 3].map(|phase| of(gains::lagged_covariance(weights, phase, lag, &site_covariance)));
             phases.iter().sum::<f64>() / (4.0 * whole)

@@ -10,6 +10,8 @@ pub struct FlatMeans {
     /// How many photosites of each class these are the means of, and how many good ones beside them.
     pub(super) photosites: Vec<u64>,
     pub(super) left_out: Vec<u64>,
+    /// How many rows and columns of cells these are.
+    pub(super) cell_lines: Option<[f64; 2]>,
     /// Photosites that are saturated in a flat.
     pub full: u64,
     /// What F scatters by from photosite to photosite, noise and response, in shares of the mean; of the class where that is most.

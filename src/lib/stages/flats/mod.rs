@@ -268,6 +268,7 @@ impl<S: RowSource> FlatFrames<S> {
                 }
             }
         }
+        tally.take_line();
         for (row, plane) in lines {
             let of_row = self.classes.row(first + row, plane);
             tally.last.fill(None);
@@ -329,10 +330,21 @@ impl<S: RowSource> FlatFrames<S> {
         let left_out = good.iter().zip(counts).map(|(good, count)| good - count).collect();
         let doubt = self.doubt_of_array(tally);
         let illumination = tally.blocks.illumination(&means);
+        let cell_lines = tally.cell_lines();
         let full = full.iter().sum();
         let share = |class: usize| Some(tally.scatter(class)? / means[class]).filter(|_| counts[class] > 0);
         let scatter = (0..self.classes.count()).filter_map(share).fold(0.0, f64::max);
-        Ok(FlatMeans { means, photosites: counts.clone(), left_out, full, scatter, limits, illumination, doubt })
+        Ok(FlatMeans {
+            means,
+            photosites: counts.clone(),
+            left_out,
+            cell_lines,
+            full,
+            scatter,
+            limits,
+            illumination,
+            doubt,
+        })
     }
 
     /// What is wrong with the array that they are said to be behind, Bayer or none, or that nothing tells, where what photosites scatter by
@@ -368,6 +380,7 @@ impl<S: RowSource> FlatFrames<S> {
             means_adu: means.means.clone(),
             photosites: means.photosites.clone(),
             left_out: means.left_out.clone(),
+            cell_lines: means.cell_lines,
             even: self.is_even,
             illumination: (!self.is_even).then(|| means.illumination.clone()),
             exposure_s: metadata.time_s(),

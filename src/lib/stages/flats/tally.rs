@@ -18,6 +18,10 @@ pub(super) struct Tally {
     pub(super) last: Vec<Option<f64>>,
     /// Whether each cell of a row of cells is whole.
     pub(super) whole: Vec<bool>,
+    /// How many rows of cells have so many whole ones: Σ n and Σ n².
+    rows: [f64; 2],
+    /// Whole cells in each column of cells.
+    columns: Vec<f64>,
     /// Sums over the photosites at each place of the 2×2 at the sensor's corner, in whole cells, and how many.
     places: [(f64, f64); 4],
     /// Sums over the photosites of whole cells by where they are.
@@ -36,6 +40,8 @@ impl Tally {
             changes: vec![[0.0; 2]; classes],
             last: vec![None; classes],
             whole: Vec::new(),
+            rows: [0.0; 2],
+            columns: Vec::new(),
             places: [(0.0, 0.0); 4],
             blocks,
         }
@@ -54,6 +60,26 @@ impl Tally {
         }
     }
 
+    /// Takes in which cells of a row of cells are whole.
+    pub(super) fn take_line(&mut self) {
+        self.columns.resize(self.whole.len().max(self.columns.len()), 0.0);
+        let mut count = 0.0;
+        for (of_column, whole) in self.columns.iter_mut().zip(&self.whole) {
+            let one = f64::from(u8::from(*whole));
+            *of_column += one;
+            count += one;
+        }
+        self.rows[0] += count;
+        self.rows[1] += count * count;
+    }
+
+    /// How many rows of cells there are, and how many columns, (Σ n)²/Σ n² of n whole cells in each; none of none.
+    pub(super) fn cell_lines(&self) -> Option<[f64; 2]> {
+        let squares = self.columns.iter().map(|n| n * n).sum();
+        let lines = [self.rows, [self.rows[0], squares]].map(|[sum, squares]| sum * sum / squares);
+        (self.rows[0] > 0.0).then_some(lines)
+    }
+
     /// The standard deviation of a class by the differences of neighbors, which slopes and dark corners leave alone; none of few.
     ///
     /// σ = √π/2 ⟨|x − x′|⟩        of normal noise
@@ -70,5 +96,23 @@ impl Tally {
         let largest = scatter.into_iter().fold(0.0, f64::max);
         let signal = self.places.map(|(sum, count)| sum / count);
         Some(Places { signal, variance: self.places.map(|(_, count)| largest * largest / count) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Geometry;
+
+    /// Three rows of four, four and two whole cells: 10²/36 rows; columns of three, three, two and two: 10²/26.
+    #[test]
+    fn lines_of_unlike_many_cells_count_as_fewer() {
+        let mut tally = Tally::new(1, Blocks::of(&Geometry::new(8, 6, &["Y"]), 1));
+        assert_eq!(tally.cell_lines(), None);
+        for whole in [[true; 4], [true; 4], [true, true, false, false]] {
+            tally.whole = whole.to_vec();
+            tally.take_line();
+        }
+        assert_eq!(tally.cell_lines(), Some([100.0 / 36.0, 100.0 / 26.0]));
     }
 }

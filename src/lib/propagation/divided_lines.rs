@@ -1,0 +1,159 @@
+//! What photosites of a row, or of a column, have in common of frames that were divided by a flat field.
+//!
+//! A row adds α to what is read of the charge of a frame and φ to that of its flat field, and its response is 1 + γ times that of others
+//! in both. To first order a quotient y = A ⟨F⟩/F of class k is off by
+//!
+//! K \[α − x φ + (E − x F_e) γ],  x = E A/E F
+//!
+//! E and F_e the light of frame and flat field: gains cancel but for what dark signal is left in either. So far rows and columns are lines
+//! like others. Besides, ⟨F⟩ moves all samples of the class in a frame together, by
+//!
+//! K x ⟨φ + F_e γ⟩
+//!
+//! the mean over the lines of whole cells. Of a whole frame the noise of the flat field cancels in the mean, as it does of photosites by
+//! themselves, and what its gains have moves the level, as they would that of a frame without a flat field.
+
+use super::charge::sensitivity;
+use super::lines::Axis;
+use super::masters::{Dark, Drawn, MOST_DARKS};
+use super::photosite::Photosite;
+use super::unpredictable::{Predicted, Unpredictable};
+use crate::frame::Geometry;
+use crate::stages::noise::NoiseModel;
+use nalgebra::{Matrix3, Vector3};
+
+/// Why nothing is said where the level of the flat field drifts.
+const DRIFTING: &str = "it was divided by a flat field, and the black level drifts along rows (`black_drift_e`): how far that moves its level is \
+                        not predicted";
+
+/// Why nothing is said where it is not recorded what the level is of.
+const UNRECORDED: &str = "it was divided by a flat field whose rows or columns share noise or gains, and nothing tells of how many its level is the \
+                          mean; correct the frame anew";
+
+/// Why nothing is said of gains that show in how samples scatter.
+const GAINS: &str = "it was divided by a flat field, and rows or columns differ so much in response that the noise of photosites does from one to \
+                     the next; how far the variance of a frame scatters by that is not predicted";
+
+/// What a line adds: to the readings of a frame, to those of the flat field, and to the response.
+struct Added {
+    covariance: Matrix3<f64>,
+    of_lines: [Vector3<f64>; 3],
+    of_level: [Vector3<f64>; 3],
+}
+
+impl Photosite {
+    /// Makes sure that it is known how far rows and columns move the level of a flat field, and that they do nothing else to a frame of such
+    /// a size.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpredictable::Beyond`].
+    pub(super) fn check_level(&self, expected_e: [f64; 3], geometry: &Geometry) -> Predicted<()> {
+        let Some(flat) = self.flat.filter(|_| self.has_lines()) else { return Ok(()) };
+        if self.drifts() {
+            return Err(Unpredictable::Beyond(DRIFTING));
+        }
+        if flat.level_lines.is_none() {
+            return Err(Unpredictable::Beyond(UNRECORDED));
+        }
+        if self.gains_show(expected_e, geometry) { Err(Unpredictable::Beyond(GAINS)) } else { Ok(()) }
+    }
+
+    /// Whether the noise of photosites follows the response of their row, or column, so that the variance of a frame scatters by that: by more
+    /// than 3 % of what chance leaves.
+    ///
+    /// n (dv/dγ)² s² > 0.06 · 2 v²        n photosites of a line, s the rms of its response
+    fn gains_show(&self, expected_e: [f64; 3], geometry: &Geometry) -> bool {
+        let (Some(adc), Some(flat)) = (&self.adc, &self.flat) else { return false };
+        let noise = |class: usize, response: f64| {
+            let site = [response, 1.0];
+            let above = Drawn::codes(&self.model, adc, expected_e[class], site).less(&self.darks, adc, site);
+            let below = flat.drawn(adc, flat.expected_e[class], site);
+            (above.variance + (above.mean / below.mean).powi(2) * below.variance) / (below.mean * below.mean)
+        };
+        self.follows_gains(geometry, 2.0, noise)
+    }
+
+    /// The same of what is drawn anew in so many exposures that are divided by one flat field.
+    pub(super) fn gains_show_over(&self, expected_e: [f64; 3], geometry: &Geometry, frames: u32) -> bool {
+        let Some(adc) = self.adc.as_ref().filter(|_| self.flat.is_some()) else { return false };
+        let noise = |class: usize, response: f64| {
+            Drawn::codes(&self.model, adc, expected_e[class], [response, 1.0]).variance / (response * response)
+        };
+        self.follows_gains(geometry, 2.0 / f64::from(frames.max(2) - 1), noise)
+    }
+
+    /// Whether the noise of a class follows the response of its lines so much, beside a relative variance that chance leaves of that of one
+    /// photosite.
+    fn follows_gains(&self, geometry: &Geometry, chance: f64, noise: impl Fn(usize, f64) -> f64) -> bool {
+        const NEGLIGIBLE: f64 = 0.06;
+        let along = [geometry.width, geometry.height].map(|length| length as f64);
+        let shows = |axis: Axis, length: f64| {
+            let [_, _, response] = axis.parts(&self.model.lines);
+            let slope = |class: usize| noise(class, 1.0 + response) / noise(class, 1.0) - 1.0;
+            response > 0.0 && (0..3).any(|class| length * slope(class).powi(2) > NEGLIGIBLE * chance)
+        };
+        Axis::ALL.into_iter().zip(along).any(|(axis, length)| shows(axis, length))
+    }
+
+    /// What three photosites of R, G and B share by a row, or by a column, in e².
+    pub(super) fn shared_by_quotients(&self, axis: Axis, expected_e: [f64; 3]) -> Option<Matrix3<f64>> {
+        let Added { covariance, of_lines, .. } = self.added_by(axis, expected_e)?;
+        Some(Matrix3::from_fn(|k, l| of_lines[k].dot(&(covariance * of_lines[l]))))
+    }
+
+    /// The covariance of what all samples of R, G and B in a frame are off together, as rows and columns move the level of the flat field, less
+    /// what photosites have of that one by one.
+    pub(super) fn level_covariance(&self, expected_e: [f64; 3]) -> [[f64; 3]; 3] {
+        let mut sum = [[0.0; 3]; 3];
+        let Some(flat) = self.flat.filter(|_| self.has_lines()) else { return sum };
+        let Some(level_lines) = flat.level_lines else { return sum };
+        for (index, axis) in Axis::ALL.into_iter().enumerate() {
+            let Some(Added { covariance, of_lines, of_level }) = self.added_by(axis, expected_e) else { continue };
+            let between = |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(&(covariance * b));
+            for (k, row) in sum.iter_mut().enumerate() {
+                for (l, sum) in row.iter_mut().enumerate() {
+                    let of_both = between(&of_lines[k], &of_level[l]) + between(&of_level[k], &of_lines[l]);
+                    let one = if k == l { flat.photosites[k].max(1.0).recip() } else { 0.0 };
+                    let shared = level_lines.shared(index, [k, l]) - one;
+                    *sum += self.slope().powi(2) * shared * (of_both + between(&of_level[k], &of_level[l]));
+                }
+            }
+        }
+        sum
+    }
+
+    /// What a line adds to quotients of R, G and B, and to their level, before the slope; none of what was not divided.
+    fn added_by(&self, axis: Axis, expected_e: [f64; 3]) -> Option<Added> {
+        let flat = self.flat.as_ref()?;
+        let terms = self.terms(axis);
+        let [.., response] = axis.parts(&self.model.lines);
+        let slope = self.slope();
+        let [left_e, left_in_flat_e] = [
+            left_e(&self.model, &self.darks, flat.levels_adu[0] / slope),
+            left_e(&flat.frames.model, &flat.darks, flat.levels_adu[1] / slope),
+        ];
+        let ratio = |k: usize| (expected_e[k] + left_e) / (flat.expected_e[k] + left_in_flat_e);
+        Some(Added {
+            covariance: Matrix3::new(
+                terms.constant,
+                -terms.linear,
+                0.0,
+                -terms.linear,
+                terms.square,
+                0.0,
+                0.0,
+                0.0,
+                response * response,
+            ),
+            of_lines: [0, 1, 2].map(|k| Vector3::new(1.0, -ratio(k), expected_e[k] - ratio(k) * flat.expected_e[k])),
+            of_level: [0, 1, 2].map(|k| Vector3::new(0.0, ratio(k), ratio(k) * flat.expected_e[k])),
+        })
+    }
+}
+
+/// The dark signal that averages, and a level, leave in a frame: a mean over photosites.
+fn left_e(model: &NoiseModel, darks: &[Option<Dark>; MOST_DARKS], level_e: f64) -> f64 {
+    let dark_e = |model: &NoiseModel| model.dark_e * sensitivity(model.dcnu).0 + model.tails.mean_hot_e();
+    dark_e(model) - darks.iter().flatten().map(|dark| dark.weight * dark_e(&dark.model)).sum::<f64>() - level_e
+}

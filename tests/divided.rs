@@ -1,0 +1,234 @@
+//! Frames of sensors that are no plain ones, divided by a flat field: they have the noise that is predicted of them.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
+use crate::support;
+use cyanometer::analysis::statistics::{Region, Saturated, measure};
+use cyanometer::camera::readout::ReadOut;
+use cyanometer::cfa::CfaPattern;
+use cyanometer::color::Space;
+use cyanometer::frame::Geometry;
+use cyanometer::metadata::FrameHeader;
+use cyanometer::propagation::{Equations, of_frame};
+use cyanometer::sigma::WithSigma;
+use cyanometer::stages::black::Black;
+use cyanometer::stages::demosaic::{Demosaic, Method};
+use cyanometer::stream::MemoryFrame;
+use rayon::prelude::*;
+use support::chain::{colored, demosaicked};
+use support::kit::{Camera, Chance, Kit};
+use support::through;
+
+const STAGES: [&str; 7] = ["three planes", "CFA plane", "a region", "BI", "ECI", "MHC", "XYZ"];
+
+/// A seed, and of each stage the subjects of tests and their deviates.
+type Trial = (u64, Vec<Vec<(String, f64)>>);
+
+/// A part of a plane.
+const PART: Region = Region { x: 21, y: 12, width: 44, height: 32 };
+
+/// A camera, its kit and the exposure of its frames.
+struct Bench {
+    camera: Camera,
+    kit: Kit,
+    exposure_s: f64,
+    electrons: [f64; 3],
+}
+
+/// A camera that `change` makes of a plain one, with darks, flats and darks of these or bias frames, as chance has them.
+fn bench(seed: u64, size: [usize; 2], is_plane: bool, change: impl Fn(&mut Chance, &mut ReadOut)) -> Bench {
+    let mut chance = Chance(seed);
+    for _ in 0..4 {
+        chance.next();
+    }
+    let mut readout = support::readout();
+    readout.dark_current_na_per_cm2 = None;
+    readout.dark_current_e_per_s = Some(chance.between(20.0, 400.0));
+    readout.dcnu = chance.between(0.02, 0.2);
+    readout.prnu = chance.between(0.002, 0.02);
+    readout.read_noise_e = chance.between(4.0, 12.0);
+    readout.bits = 14;
+    readout.full_well_e = 60_000.0;
+    readout.adu_per_e = chance.between(0.2, 0.3);
+    readout.bias_adu = chance.between(500.0, 900.0);
+    change(&mut chance, &mut readout);
+    let temperature_k = readout.temperature_k;
+    let pattern = CfaPattern::ALL[chance.whole(0, 3)];
+    let cfa = Some(pattern).filter(|_| is_plane);
+    readout.cfa = pattern.into();
+    let camera = Camera { readout, size, cfa, seed: 1000 * seed, frames: 0.into() };
+    let (exposure_s, flat_s) = (chance.between(0.02, 0.3), chance.between(0.02, 0.2));
+    let mut electrons = [(); 3].map(|()| chance.between(300.0, 16_000.0));
+    let mut level = [(); 3].map(|()| chance.between(6000.0, 16_000.0));
+    if camera.readout.smear_line_s > 0.0 {
+        // Columns with red photosites have the smear of those with blue ones.
+        (electrons[2], level[2]) = (electrons[0], level[0]);
+    }
+    let mut kit = Kit::default();
+    let mut count = || chance.whole(1, 6);
+    let counts = [(); 4].map(|()| count());
+    kit.darks = camera.darks(counts[0], exposure_s, temperature_k);
+    kit.flats = (0..counts[1]).map(|_| camera.expose(level, flat_s, temperature_k)).collect();
+    match seed % 3 {
+        // Dark signal stays in the flat field.
+        0 => kit.biases = camera.darks(counts[2], 1e-5, temperature_k),
+        _ => kit.flat_darks = camera.darks(counts[2], flat_s, temperature_k),
+    }
+    if seed.is_multiple_of(3) {
+        // Of frames that keep theirs too bias frames alone come off.
+        kit.darks.clear();
+    }
+    Bench { camera, kit, exposure_s, electrons }
+}
+
+impl Bench {
+    fn frame(&self) -> MemoryFrame {
+        let temperature_k = self.camera.readout.temperature_k;
+        self.kit.correct(&self.camera.expose(self.electrons, self.exposure_s, temperature_k))
+    }
+}
+
+/// The corrected plane without its layer of marks, where no sample has any.
+fn plane(corrected: &MemoryFrame) -> MemoryFrame {
+    let mut header = corrected.header.clone();
+    header.geometry.channels.pop();
+    let [all, ours] = [&corrected.header, &header].map(|header| header.geometry.row_samples());
+    let rows = || corrected.samples.chunks_exact(all);
+    assert!(rows().all(|row| row[ours..].iter().all(|mark| *mark == 0.0)), "samples are marked");
+    MemoryFrame::new(header, rows().flat_map(|row| row[..ours].to_vec()).collect())
+}
+
+/// What is said of a frame: subjects of tests and their deviates.
+fn told(frame: &MemoryFrame, parts: &[Region]) -> Vec<(String, f64)> {
+    if let Err(why) = of_frame(&frame.header, Equations::Exact) {
+        eprintln!("nothing predicted: {why}");
+        return Vec::new();
+    }
+    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+    let report = measure(&mut source, parts, Saturated::Kept, Equations::Exact, Some(0.5)).unwrap();
+    let tests = report.regions.into_iter().next().unwrap().tests;
+    tests.iter().filter_map(|test| test.deviate().map(|z| (format!("{:?}", test.subject), z))).collect()
+}
+
+/// Deviates of means and variances at every stage have rms 1 within 4 standard errors, and none is above 5. CYANOMETER_CAMERAS sets how many
+/// cameras.
+fn check(most: u64, size: [usize; 2], change: impl Fn(&mut Chance, &mut ReadOut) + Sync) {
+    let cameras: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(most, |count| count.parse().unwrap());
+    let trials: Vec<Trial> = (1..=cameras)
+        .into_par_iter()
+        .map(|seed| {
+            let [planes, plane] = [false, true].map(|is_plane| plane(&bench(seed, size, is_plane, &change).frame()));
+            let methods = [Method::Bilinear, Method::EffectiveColor, Method::Malvar];
+            let pixels = methods.map(|method| demosaicked(&plane, method));
+            let xyz = colored(&pixels[1], Space::Xyz);
+            let first = [told(&planes, &[]), told(&plane, &[]), told(&plane, &[PART])];
+            (seed, first.into_iter().chain(pixels.iter().chain([&xyz]).map(|frame| told(frame, &[]))).collect())
+        })
+        .collect();
+    let mut failures = Vec::new();
+    for (stage, name) in STAGES.iter().enumerate() {
+        for subject in ["Mean", "Variance"] {
+            let of = |(seed, stages): &Trial| -> Vec<(u64, f64)> {
+                stages[stage].iter().filter(|(of, _)| of == subject).map(|(_, z)| (*seed, *z)).collect()
+            };
+            let deviates: Vec<(u64, f64)> = trials.iter().flat_map(of).collect();
+            let n = deviates.len() as f64;
+            let rms = (deviates.iter().map(|(_, z)| z * z).sum::<f64>() / n).sqrt();
+            let (worst, most) =
+                deviates.iter().fold((0, 0.0_f64), |at, (seed, z)| if z.abs() > at.1.abs() { (*seed, *z) } else { at });
+            // Channels that are made of the same photosites are as good as one.
+            let error = (0.5 / if stage < 3 { n } else { n / 3.0 }).sqrt();
+            eprintln!("{name}, {subject}: rms {rms:.3} of {n}, ±{error:.3}; largest {most:.2} of camera {worst}");
+            if n < 2.5 * cameras as f64 || (rms - 1.0).abs() > 4.0 * error || most.abs() > 5.0 {
+                failures.push(format!("{name}, {subject}: rms {rms}, largest {most} of camera {worst}"));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// Hot pixels that make up to half the dark signal, and jumps as large as the read noise.
+fn tailed(chance: &mut Chance, readout: &mut ReadOut) {
+    let kinds = chance.whole(0, 2);
+    if kinds != 0 {
+        readout.hot_pixel_share = chance.between(0.005, 0.1);
+        readout.hot_pixel_dark_current_e_per_s = chance.between(300.0, 3000.0);
+    }
+    if kinds != 1 {
+        readout.rts_share = chance.between(0.02, 0.3);
+        readout.rts_amplitude_e = chance.between(4.0, 40.0);
+    }
+}
+
+/// Rows and columns whose noise, offsets and gains are as large as what photosites have of their own.
+fn lined(chance: &mut Chance, readout: &mut ReadOut) {
+    let mut part = |most: f64| if chance.next() < 0.4 { 0.0 } else { chance.between(0.2 * most, most) };
+    (readout.row_noise_e, readout.column_noise_e) = (part(30.0), part(30.0));
+    (readout.dsnu_e, readout.dsnu_row_e, readout.dsnu_column_e) = (part(20.0), part(20.0), part(20.0));
+    (readout.prnu_row, readout.prnu_column) = (part(0.006), part(0.006));
+    readout.read_noise_e = readout.read_noise_e.max(1.0 / readout.adu_per_e);
+}
+
+/// The standard deviations of pixels of a layer are those that are predicted of them on the mean, to what levels scatter by: their own
+/// noise, a hundredth, moves them by less than that.
+#[test]
+fn layers_of_sigma_are_as_predicted() {
+    let changes: [fn(&mut Chance, &mut ReadOut); 2] = [tailed, lined];
+    for (seed, change) in (1..=4).flat_map(|seed| changes.map(|change| (seed, change))) {
+        let plane = plane(&bench(seed, [60, 48], true, change).frame());
+        for method in [Method::Bilinear, Method::Malvar] {
+            let stage = Demosaic::new(&plane.header, method, Black::Auto, None).unwrap();
+            let mut made = through(&plane, &WithSigma::of_demosaicking(stage).unwrap());
+            let report = measure(&mut made, &[], Saturated::Kept, Equations::Exact, None).unwrap();
+            let channels = &report.regions[0].channels;
+            for k in 0..3 {
+                let sigma = channels[3 + k].mean.unwrap().hypot(channels[3 + k].std.unwrap());
+                let predicted = channels[k].predicted_std.unwrap();
+                assert!((sigma / predicted - 1.0).abs() < 0.01, "{seed} {method:?} {k}: {sigma} {predicted}");
+            }
+        }
+    }
+}
+
+/// What is not predicted is refused by name.
+#[test]
+fn what_is_beyond_is_named() {
+    let why = |size: [usize; 2], change: &dyn Fn(&mut ReadOut), after: &dyn Fn(&mut MemoryFrame)| {
+        let mut frame = bench(1, size, true, |_, readout| change(readout)).frame();
+        after(&mut frame);
+        let whole = FrameHeader { geometry: Geometry::new(size[0], size[1], &["Y"]), ..frame.header };
+        of_frame(&whole, Equations::Exact).map_or_else(|why| why.to_string(), |_| "predicted".to_owned())
+    };
+    let as_it_is = |_: &mut MemoryFrame| ();
+    let rows = |readout: &mut ReadOut| readout.row_noise_e = 5.0;
+    assert_eq!(why([20, 16], &rows, &as_it_is), "predicted");
+    let before = |frame: &mut MemoryFrame| {
+        frame.header.metadata.correction.as_mut().unwrap().flat.as_mut().unwrap().cell_lines = None;
+    };
+    let unrecorded = why([20, 16], &rows, &before);
+    assert!(unrecorded.contains("correct the frame anew"), "{unrecorded}");
+    let drift = |readout: &mut ReadOut| (readout.black_drift_e, readout.black_drift_rows) = (3.0, 20.0);
+    assert!(why([20, 16], &drift, &as_it_is).contains("how far that moves its level"));
+    let gains = |readout: &mut ReadOut| readout.prnu_column = 0.03;
+    assert!(why([20, 160], &gains, &as_it_is).contains("differ so much in response"));
+    let hot = |readout: &mut ReadOut| {
+        (readout.hot_pixel_share, readout.hot_pixel_dark_current_e_per_s) = (0.01, 1e5);
+    };
+    assert!(why([20, 16], &hot, &as_it_is).contains("fill up or go beyond the codes"));
+}
+
+#[test]
+fn rows_and_columns_are_predicted() {
+    check(10, [120, 100], lined);
+}
+
+/// Smear of up to a tenth of the light.
+#[test]
+fn smear_is_predicted() {
+    check(6, [120, 100], |chance, readout| readout.smear_line_s = chance.between(2e-7, 1e-6));
+}
+
+#[test]
+fn hot_pixels_and_jumps_are_predicted() {
+    check(12, [120, 100], tailed);
+}
