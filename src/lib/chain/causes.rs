@@ -127,7 +127,7 @@ fn of_tapped(
     let of_tap = |tap: usize| budgets.iter().find(|(of, _)| *of == tap);
     let mut found = each(|cause| {
         let of_site = |tap: usize, class: usize| of_tap(tap).map_or(0.0, |(_, causes)| causes[class][cause as usize]);
-        pixels.within(cause.shared_by(), of_site).diagonal().into()
+        pixels.within(cause.shared_by(), cause == Cause::BlackDrift, of_site).diagonal().into()
     });
     if pixels.has_lines() {
         let (first_order, fixed) = (pixels.first_order(), pixels.fixed(means));

@@ -185,17 +185,15 @@ impl Predictor {
         for (stage, head) in &self.heads {
             let none = |why| refused(*stage, electrons, why);
             let is_pixels = head.metadata.demosaic.is_some();
-            let do_rows_drift = || head.readout().is_ok_and(|readout| readout.black_drift_e > 0.0);
-            if is_pixels && self.settings.camera.method == Method::SmoothHue && do_rows_drift() {
-                no_pixels = Some(PIXELS_IN_DRIFT.to_owned());
-                continue;
-            }
             if head.taps().is_some() {
                 match self.settings.of_taps(head) {
                     Ok((prediction, causes)) => {
                         if let (FramePrediction::Tapped(pixels), ChainStage::Lab) = (&prediction, *stage) {
                             let patches = self.settings.patches(head, &prediction, &pixels.covariance).map_err(none)?;
                             noise_delta_e = Some(self.settings.delta_e(pixels.noise_length(), &patches));
+                        }
+                        if let (FramePrediction::Tapped(pixels), ChainStage::Demosaicked) = (&prediction, *stage) {
+                            first_order = pixels.of_hue;
                         }
                         stages.push(self.settings.stage(*stage, head, &prediction, &causes).map_err(none)?);
                     }
@@ -249,10 +247,6 @@ fn refused(stage: ChainStage, electrons: [f64; 3], why: Unpredictable) -> Error 
     Error::Data(format!("nothing can be predicted of {} at {electrons:?} electrons: {why}", stage.name()))
 }
 
-/// Why no pixels are predicted of a black level that drifts.
-const PIXELS_IN_DRIFT: &str = "the black level of the sensor drifts along rows (`black_drift_e`), and what pixels by shti share by that is \
-                               not predicted; pixels by other methods are (--method)";
-
 impl PredictorSettings {
     /// A frame that several amplifiers read, and the variances of its photosites by cause: of photosites means over all of a class, of
     /// pixels those behind each.
@@ -297,6 +291,9 @@ impl PredictorSettings {
         let second_order = match prediction {
             FramePrediction::Pixels(mixture) if self.camera.method == Method::SmoothHue => {
                 Some(rows(&mixture.covariance))
+            }
+            FramePrediction::Tapped(pixels) if self.camera.method == Method::SmoothHue => {
+                Some(rows(&pixels.covariance))
             }
             _ => None,
         };
@@ -372,6 +369,9 @@ impl PredictorSettings {
             FramePrediction::Pixels(mixture) => {
                 let first_order = || gains::mean_pixel_covariance(&mixture.weights, &mixture.site_covariance());
                 (mixture.mean, if is_curved { mixture.covariance } else { first_order() })
+            }
+            FramePrediction::Tapped(pixels) if pixels.of_hue.is_some() && !is_curved => {
+                (pixels.mean, pixels.first_order() + pixels.between())
             }
             FramePrediction::Tapped(pixels) => (pixels.mean, pixels.covariance),
         }

@@ -135,6 +135,24 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
+/// Places between two knots over which what is curved in a drift is told.
+pub const PLACES: [f64; 8] = [0.0625, 0.1875, 0.3125, 0.4375, 0.5625, 0.6875, 0.8125, 0.9375];
+
+/// Covariance of rows at two places, in knots, of a drift of variance 1.
+pub fn between(one: f64, other: f64) -> f64 {
+    let [(j, [a, b]), (k, [c, d])] = [one, other].map(|place| {
+        let angle = FRAC_PI_2 * (place - place.floor());
+        #[expect(clippy::cast_possible_truncation, reason = "a few rows about a pixel")]
+        (place.floor() as i64, [libm::cos(angle), libm::sin(angle)])
+    });
+    match k - j {
+        0 => a * c + b * d,
+        1 => b * c,
+        -1 => a * d,
+        _ => 0.0,
+    }
+}
+
 /// Covariance of rows so many knots apart, over their places, of a drift of variance 1.
 pub fn covariance(knots_apart: f64) -> f64 {
     let delta = knots_apart.abs();

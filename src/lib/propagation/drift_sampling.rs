@@ -12,7 +12,8 @@
 //! of what these have together in all columns, which far from the edges is the same in every other row.
 
 use super::covariance::PAIRS;
-use super::line_sampling::{AxisSums, Nonlocal, Powers, Shared, add_both, sum_of};
+use super::drift_bands::{Bands, KNOTS};
+use super::line_sampling::{AxisSums, Nonlocal, Shared, add_both, sum_of};
 use super::mixed_pixel::pixels_of;
 use super::moments::SiteCovariance;
 use super::place::{Place, add_products, steps};
@@ -21,9 +22,6 @@ use crate::stages::demosaic::stencil::REACH;
 use crate::stages::demosaic::weights::Weights;
 use crate::stages::noise::knots;
 use nalgebra::{Matrix3, Vector3};
-
-/// Knots that the rows of a stencil meet: there are two rows at least from one to the next.
-const KNOTS: usize = REACH.unsigned_abs() + 3;
 
 /// Products of two covariances by pairs of channels, and those of their row sums in both orders.
 pub(super) struct Products {
@@ -74,10 +72,7 @@ struct Lines {
     /// Pixels of a row, by parity.
     counts: [f64; 2],
     loads: Vec<[Loads; 2]>,
-    /// g.
-    sums: Vec<Vector3<f64>>,
-    /// T(m, m + δ).
-    bands: Vec<[Matrix3<f64>; KNOTS]>,
+    bands: Bands,
 }
 
 impl Lines {
@@ -106,53 +101,20 @@ impl Lines {
             .collect();
         let counts = rows.counts();
         let length = loads.last().map_or(0, |[last, _]| last.first) + KNOTS;
-        let mut sums = vec![Vector3::zeros(); length];
-        let mut bands = vec![[Matrix3::zeros(); KNOTS]; length];
+        let mut bands = Bands::zero(length);
         for (loads, count) in loads.iter().flat_map(|both| both.iter().zip(counts)) {
             for (k, load) in loads.of_knots.iter().enumerate() {
-                sums[loads.first + k] += count * load;
+                bands.sums[loads.first + k] += count * load;
                 for (apart, other) in loads.of_knots[k..].iter().enumerate() {
-                    bands[loads.first + k][apart] += count * load * other.transpose();
+                    bands.products[loads.first + k][apart] += count * load * other.transpose();
                 }
             }
         }
-        Self { counts, loads, sums, bands }
+        Self { counts, loads, bands }
     }
 
     fn row_sum(&self, t: usize, p: usize) -> Matrix3<f64> {
-        self.loads[t][p].with(&self.sums)
-    }
-
-    /// T(m, m′) of all m and m′ that have one.
-    fn each_band(&self) -> impl Iterator<Item = (usize, usize, Matrix3<f64>)> + '_ {
-        self.bands.iter().enumerate().flat_map(|(m, of_knot)| {
-            of_knot.iter().enumerate().flat_map(move |(apart, band)| {
-                let both = if apart == 0 { 1 } else { 2 };
-                [(m, m + apart, *band), (m + apart, m, band.transpose())].into_iter().take(both)
-            })
-        })
-    }
-
-    /// What powers of a channel's covariance are made of.
-    fn powers(&self, channel: usize) -> Powers {
-        let length = self.bands.len();
-        let entry = |m: usize, n: usize| {
-            let (low, high) = (m.min(n), m.max(n));
-            self.bands[low].get(high - low).map_or(0.0, |band| band[(channel, channel)])
-        };
-        let near = |m: usize| m.saturating_sub(KNOTS - 1)..(m + KNOTS).min(length);
-        let [mut one, mut two, mut three, mut square, mut cube] = [0.0; 5];
-        for m in 0..length {
-            one += entry(m, m);
-            let of_sums: f64 = near(m).map(|n| entry(m, n) * self.sums[n][channel]).sum();
-            square += self.sums[m][channel] * of_sums;
-            cube += of_sums * of_sums;
-            for n in near(m) {
-                two += entry(m, n).powi(2);
-                three += near(n).map(|l| entry(m, n) * entry(n, l) * entry(l, m)).sum::<f64>();
-            }
-        }
-        Powers { traces: [one, two, three], of_row_sums: [square, cube] }
+        self.loads[t][p].with(&self.bands.sums)
     }
 }
 
@@ -164,8 +126,8 @@ impl DriftSums {
         let rows = Shared::of(weights, &others.row, 0, place, place.size[0]);
         let lines = Lines::of(&rows, &drift, place);
         let mut sums = Self {
-            variance: lines.bands.iter().map(|band| band[0]).sum(),
-            total: lines.sums.iter().map(|sum| sum * sum.transpose()).sum(),
+            variance: lines.bands.variance(),
+            total: lines.bands.total(),
             shared: Products::none(),
             with_own: Products::none(),
             powers: Default::default(),
@@ -176,7 +138,7 @@ impl DriftSums {
         sums.shared.add_columns(&lines, &columns);
         let others = of_rows + columns.total;
         sums.powers = [0, 1, 2].map(|i| {
-            let [one, two, three] = lines.powers(i).projected(sums.total[(i, i)], pixels);
+            let [one, two, three] = lines.bands.powers(i).projected(sums.total[(i, i)], pixels);
             // What other things rows and columns share adds to these as much as one trace of both tells.
             let together = sums.shared.trace(i, others[(i, i)] * sums.total[(i, i)], pixels);
             let beside = if one > 0.0 { together.max(0.0) / one } else { 0.0 };
@@ -208,13 +170,7 @@ impl Products {
     }
 
     fn add_itself(&mut self, lines: &Lines) {
-        for (_, _, t) in lines.each_band() {
-            for (row, [i, j]) in self.of_pairs.iter_mut().zip(PAIRS) {
-                for (entry, [k, l]) in row.iter_mut().zip(PAIRS) {
-                    *entry += t[(i, j)] * (t[(k, l)] + t[(l, k)]);
-                }
-            }
-        }
+        self.of_pairs = sum_of(&self.of_pairs, &lines.bands.products_of_pairs());
         for t in 0..lines.loads.len() {
             for p in 0..2 {
                 let row_sum = lines.row_sum(t, p);
@@ -258,7 +214,7 @@ impl Products {
             return;
         }
         // Of the pixels of a column, by its parity and that of their row.
-        let mut sums = [[(); 2]; 2].map(|of| of.map(|()| vec![Vector3::zeros(); lines.sums.len()]));
+        let mut sums = [[(); 2]; 2].map(|of| of.map(|()| vec![Vector3::zeros(); lines.bands.sums.len()]));
         for (t, both) in lines.loads.iter().enumerate() {
             for (p, loads) in both.iter().enumerate() {
                 let sums = sums[p][t % 2][loads.first..].iter_mut();

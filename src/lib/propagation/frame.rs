@@ -6,7 +6,6 @@
 use super::curved;
 use super::gains;
 use super::ground::{Ground, quantity_of_sites, subtracted};
-use super::lines::{DRIFTING, TAPPED_DRIFT};
 use super::moments::LineCovariance;
 use super::moments::{Equations, Prediction, SiteCovariance};
 use super::photosite::Photosite;
@@ -282,9 +281,6 @@ impl Sites {
         let equations = self.photosite.equations;
         let method = Method::named(&record.method)
             .ok_or(Unpredictable::Beyond("it was demosaicked by a method that is unknown here"))?;
-        if self.photosite.drifts() && method == Method::SmoothHue {
-            return Err(Unpredictable::Beyond(DRIFTING));
-        }
         let black = subtracted(record.black, record.black_deltas)?;
         let size = [frame.geometry.width, frame.geometry.height];
         let mut camera = PixelMoments::demosaicked(record.cfa, black, method, self.moments, size, equations)
@@ -378,17 +374,8 @@ impl PixelMoments {
 /// Why the paper says nothing of pixels of several amplifiers.
 const OF_ONE: &str = "the paper's sensor is read through one amplifier, and several (`taps`) have a part in its pixels";
 
-/// Why nothing is said of smooth hue transition.
-const BY_HUE: &str = "smooth hue transition divides by green, and several amplifiers (`taps` of the sensor) have a part in its pixels; of \
-                      them bi, eci and mhc are predicted, and regions and crops behind one";
-
-/// The same where they read columns by turns.
-const BY_HUE_BY_TURNS: &str = "smooth hue transition divides by green, and several amplifiers (`taps` of the sensor) have a part in its \
-                               pixels; of them bi, eci and mhc are predicted";
-
 /// Pixels of a frame that several amplifiers have a part in.
 fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> {
-    let record = frame.metadata.demosaic.as_ref().ok_or(Unpredictable::Missing("demosaic"))?;
     let beyond = |why: &'static str| Err(Unpredictable::Beyond(why));
     if equations == Equations::Paper {
         return beyond(OF_ONE);
@@ -396,13 +383,10 @@ fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> 
     if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
         return beyond(taps::FLATTENED);
     }
-    if Method::named(&record.method) == Some(Method::SmoothHue) {
-        return beyond(if taps::are_by_turns(frame) { BY_HUE_BY_TURNS } else { BY_HUE });
-    }
     pixels_by_place(frame, equations)
 }
 
-/// Pixels of a frame by their places, of one amplifier or several; by smooth hue transition to first order, of one.
+/// Pixels of a frame by their places, of one amplifier or several.
 fn pixels_by_place(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> {
     let metadata = &frame.metadata;
     let record = metadata.demosaic.as_ref().ok_or(Unpredictable::Missing("demosaic"))?;
@@ -411,10 +395,8 @@ fn pixels_by_place(frame: &FrameHeader, equations: Equations) -> Predicted<Tappe
     for part in taps::parts(&taps::with_footprint(frame)) {
         let of_tap = FrameHeader { geometry: frame.geometry.clone(), ..part.frame };
         let sites = Sites::of(&of_tap, equations)?;
-        if sites.photosite.drifts() {
-            return beyond(TAPPED_DRIFT);
-        }
-        if sites.photosite.has_tails() && is_curved(metadata.quantity) {
+        let is_by_hue = Method::named(&record.method) == Some(Method::SmoothHue);
+        if sites.photosite.has_tails() && (is_by_hue || is_curved(metadata.quantity)) {
             return beyond(tails::CURVED);
         }
         lit.push(sites.lit());

@@ -60,16 +60,12 @@ const OFFSETS_SHOW: &str = "photosites have fixed offsets, and the noise of the 
                             before the converter does";
 
 /// Why nothing is said of a drift that codes follow on a curve.
-const DRIFT_CUT: &str = "its black level drifts along rows, and full well, an end of the codes or a step of them cuts what rows share \
+pub(super) const DRIFT_CUT: &str = "its black level drifts along rows, and full well, an end of the codes or a step of them cuts what rows share \
                          by that";
 
 /// Why nothing is said of a drift that the curve of a converter bends.
 const DRIFT_BENT: &str =
     "its black level drifts along rows, and the curve of the converter (`linearization`) bends what rows share by that";
-
-/// Why nothing is said of pixels by smooth hue transition of a frame whose black level drifts.
-pub(super) const DRIFTING: &str = "its black level drifts along rows (`black_drift_e`), and what pixels by smooth hue transition (shti) share by \
-                                   that is not predicted; pixels by other methods are";
 
 /// Why pixels of frames that were divided by a flat field have no standard deviations where the black level drifts.
 pub(super) const DIVIDED_DRIFT: &str =
@@ -77,10 +73,6 @@ pub(super) const DIVIDED_DRIFT: &str =
 
 /// Why the paper says nothing.
 const NOT_IN_THE_PAPER: &str = "the paper has no equations for noise of rows and columns, nor for fixed offsets";
-
-/// The same where several amplifiers have read it.
-pub(super) const TAPPED_DRIFT: &str = "its black level drifts along rows (`black_drift_e`), and several amplifiers (`taps` of the sensor) \
-                                       have read them; photosites behind one are predicted";
 
 /// Along rows or along columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -433,6 +425,11 @@ impl LineTerms {
     pub fn between(&self, (x, [of_offsets, of_gains]): Site, (y, [with_offsets, with_gains]): Site) -> f64 {
         of_offsets * with_offsets * (self.constant + self.linear * (x + y))
             + of_gains * with_gains * self.square * x * y
+    }
+
+    /// The same of sums of samples: what their slopes are together, and their slopes times signals.
+    pub fn of_sums(&self, [a, b]: [f64; 2], [other_a, other_b]: [f64; 2]) -> f64 {
+        self.constant * a * other_a + self.linear * (a * other_b + b * other_a) + self.square * b * other_b
     }
 
     /// Less what does not hang on signals.

@@ -175,6 +175,8 @@ struct Temporal<'a> {
     is_fine: bool,
     light: Vec<Count>,
     dark: Vec<Count>,
+    /// What both reach; none where they are not listed.
+    extents: Option<[Extent; 2]>,
     jumps: Vec<Jump>,
 }
 
@@ -197,6 +199,32 @@ impl Jump {
     }
 }
 
+/// What counts reach, and their sums.
+#[derive(Debug, Clone, Copy)]
+struct Extent {
+    least: f64,
+    most: f64,
+    /// The largest spread of one.
+    spread: f64,
+    /// Of their weights, and of these times electrons.
+    weight: f64,
+    sum: f64,
+}
+
+impl Extent {
+    fn of(counts: &[Count]) -> Option<Self> {
+        let first = counts.first()?.electrons;
+        let start = Self { least: first, most: first, spread: 0.0, weight: 0.0, sum: 0.0 };
+        Some(counts.iter().fold(start, |found, count| Self {
+            least: found.least.min(count.electrons),
+            most: found.most.max(count.electrons),
+            spread: found.spread.max(count.spread),
+            weight: found.weight + count.weight,
+            sum: found.sum + count.weight * count.electrons,
+        }))
+    }
+}
+
 impl<'a> Temporal<'a> {
     fn of(Seen { law, reading, median_of, is_fine }: &'a Seen) -> Self {
         let noise_e = law.read_noise_e.max(1e-3);
@@ -208,13 +236,15 @@ impl<'a> Temporal<'a> {
             counts.retain(|count| count.weight > 1e-15);
             counts
         };
+        let (light, dark) = (counts(&light), counts(&dark));
         Self {
             law,
             reading,
             median_of: *median_of,
             is_fine: *is_fine,
-            light: counts(&light),
-            dark: counts(&dark),
+            extents: Extent::of(&light).zip(Extent::of(&dark)).map(Into::into),
+            light,
+            dark,
             jumps: law.jumps().into_iter().map(|jump| Jump::of(jump, reading, law.full_well_e)).collect(),
         }
     }
@@ -315,8 +345,12 @@ impl<'a> Temporal<'a> {
         self.jumps.iter().map(reaches).sum()
     }
 
+    /// The sum over counts; where these are all read straight, or as one code, of their mean.
     fn sum(&self, reading: &Reading, at_full: f64, x: f64, y: f64) -> f64 {
         let full = self.law.full_well_e;
+        if let Some(mean) = self.even_sum(reading, x, y) {
+            return mean;
+        }
         let mut mean = 0.0;
         effort::spend((self.dark.len() * self.light.len()) as u64);
         for dark in &self.dark {
@@ -328,6 +362,24 @@ impl<'a> Temporal<'a> {
             }
         }
         mean
+    }
+
+    /// The sum over counts none of which is full, nor read as an end of the codes by chance; none of others.
+    fn even_sum(&self, reading: &Reading, x: f64, y: f64) -> Option<f64> {
+        let [light, dark] = self.extents?;
+        let spread = REACH * (x * light.spread).hypot(y * dark.spread);
+        let low = x * light.least + y * dark.least - spread;
+        let high = x * light.most + y * dark.most + spread;
+        if high >= self.law.full_well_e {
+            return None;
+        }
+        let weight = light.weight * dark.weight;
+        if reading.is_one(low, high) {
+            return Some(weight * reading.mean_at(low, 0.0));
+        }
+        let (slope, _) = reading.straight_between(low, high)?;
+        let charge = x * light.sum * dark.weight + y * dark.sum * light.weight;
+        Some(weight * reading.smooth_at(low)[0] + slope * (charge - weight * low))
     }
 
     /// Cumulants of the charge.

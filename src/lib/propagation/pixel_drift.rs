@@ -35,7 +35,7 @@ struct RowWeights([[OfRows; 3]; 2]);
 type OfRows = Vec<(isize, [f64; 3])>;
 
 impl RowWeights {
-    fn of(table: &WeightTable, at: [usize; 2], geometry: &Geometry) -> Self {
+    fn of(table: &WeightTable, at: [usize; 2], geometry: &Geometry, gain: impl Fn([isize; 2]) -> f64) -> Self {
         let phase = phase_at(at, geometry);
         let by_rows = |stencil: &Stencil| {
             let mut rows = OfRows::new();
@@ -44,7 +44,8 @@ impl RowWeights {
                     rows.push((offset[1], [0.0; 3]));
                     rows.len() - 1
                 });
-                rows[place].1[table.class(phase, offset) as usize] += weight;
+                let of_site = gain([0, 1].map(|axis| at[axis].cast_signed() + offset[axis]));
+                rows[place].1[table.class(phase, offset) as usize] += weight * of_site;
             }
             rows
         };
@@ -56,20 +57,22 @@ impl RowWeights {
 const KNOTS: usize = 6;
 
 impl PixelDrift {
-    /// That of the pixels of a frame, an average or not, of which such places are the kinds.
+    /// That of the pixels of a frame, an average or not, of which such places are the kinds; `gain` is the slope of the photosite at a place,
+    /// relative to that of all.
     pub fn of(
         photosite: &Photosite,
         average: Option<&AverageRecord>,
         table: &WeightTable,
         kinds: &[[usize; 2]],
         geometry: &Geometry,
+        gain: impl Fn([isize; 2]) -> f64,
     ) -> Self {
         let first = i64::from(geometry.origin[1]);
         let rows_per_knot = photosite.drift_rows();
         Self {
             variance_e2: photosite.drift_e2(average),
             knots: (0..geometry.height).map(|row| knots(first + row as i64, rows_per_knot)).collect(),
-            weights: kinds.iter().map(|&at| RowWeights::of(table, at, geometry)).collect(),
+            weights: kinds.iter().map(|&at| RowWeights::of(table, at, geometry, &gain)).collect(),
         }
     }
 

@@ -39,7 +39,7 @@ impl PixelLines {
         geometry: &Geometry,
         gain: impl Fn([isize; 2]) -> f64,
     ) -> Self {
-        let drift = photosite.drifts().then(|| PixelDrift::of(&photosite, average, table, kinds, geometry));
+        let drift = photosite.drifts().then(|| PixelDrift::of(&photosite, average, table, kinds, geometry, &gain));
         let [rows, columns] = photosite.line_terms(average);
         Self {
             gains: kinds.iter().map(|&at| PixelGains::of_lines(table, at, geometry, &gain)).collect(),

@@ -101,7 +101,7 @@ impl PixelMoments {
     pub(super) fn curved(&self, local: &color::Local, value: impl Fn([f64; 3]) -> [f64; 3]) -> Option<Self> {
         let straight = self.through(&local.jacobian, 0.0);
         let further = self.beyond_weights();
-        if self.is_bent_by(&further) {
+        if is_bent_by(self.mean, &self.covariance, &further) {
             return None;
         }
         // What rows and columns share is in the covariance alone: it is normal.
@@ -129,17 +129,6 @@ impl PixelMoments {
         let straight = self.through(&local.jacobian, 0.0);
         let bias = local.bias(&self.covariance);
         Self { mean: [0, 1, 2].map(|i| local.value[i] + bias[i]), bias, ..straight }
-    }
-
-    /// Whether what smooth hue transition adds to the covariance in second order is so much that the third cumulants which it adds, about
-    /// three times the root of its share, show in what is curved in the channels.
-    fn is_bent_by(&self, further: &Matrix3<f64>) -> bool {
-        const SHOWS: f64 = 5e-3;
-        (0..3).any(|i| {
-            let variance = self.covariance[(i, i)].max(f64::MIN_POSITIVE);
-            let share = variance.sqrt() / self.mean[i].abs();
-            share * 3.0 * (further[(i, i)].abs() / variance).sqrt() > SHOWS
-        })
     }
 
     /// Cumulants of the channels of a pixel of one phase, by the weights, as if all photosites were drawn apart.
@@ -189,8 +178,19 @@ impl PixelMoments {
     }
 }
 
+/// Whether what smooth hue transition adds to the covariance in second order is so much that the third cumulants which it adds, about
+/// three times the root of its share, show in what is curved in the channels.
+pub(super) fn is_bent_by(mean: [f64; 3], covariance: &Matrix3<f64>, further: &Matrix3<f64>) -> bool {
+    const SHOWS: f64 = 5e-3;
+    (0..3).any(|i| {
+        let variance = covariance[(i, i)].max(f64::MIN_POSITIVE);
+        let share = variance.sqrt() / mean[i].abs();
+        share * 3.0 * (further[(i, i)].abs() / variance).sqrt() > SHOWS
+    })
+}
+
 /// Whether no variance is below zero and no correlation beyond 1, but for rounding.
-fn is_covariance(matrix: &Matrix3<f64>) -> bool {
+pub(super) fn is_covariance(matrix: &Matrix3<f64>) -> bool {
     let allowance = 1e-9 * matrix.trace().abs();
     matrix.symmetric_eigenvalues().iter().all(|value| *value >= -allowance)
 }

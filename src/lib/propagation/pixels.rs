@@ -8,12 +8,13 @@ use super::charge;
 use super::covariance::Covariance;
 use super::ground::{corrected, quantity_of_sites};
 use super::level_variance::{HALF_A_CODE, LevelVariance};
-use super::lines::{DIVIDED_DRIFT, TAPPED_DRIFT};
+use super::lines::DIVIDED_DRIFT;
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::pixel_gains::{PixelGains, phase_at};
 use super::pixel_light::PixelVariances;
 use super::pixel_lines::PixelLines;
+use super::pixel_tap_lines::{OfTaps, PixelTapLines, TAPS};
 use super::reading::ENDLESS;
 use super::repeated::average_of;
 use super::smooth_hue;
@@ -92,9 +93,6 @@ impl Places {
     }
 }
 
-/// Most amplifiers of a sensor.
-const TAPS: usize = 4;
-
 /// What each of the amplifiers of a sensor makes of the photosites of pixels.
 #[derive(Debug, Clone, PartialEq)]
 struct PixelTaps {
@@ -105,11 +103,13 @@ struct PixelTaps {
     shifts: Vec<f64>,
     /// The slope of each, relative to that of the sensor.
     slopes: Vec<f64>,
+    /// What photosites share by rows and by columns, where the converter is curved.
+    lines: Option<PixelTapLines>,
 }
 
 impl PixelTaps {
     /// What is the own of photosites, of such variances, of which those of the sensor's slope share so much.
-    fn own(&self, whole: [f64; 3 * TAPS], shared: [f64; 3]) -> [f64; 3 * TAPS] {
+    fn own(&self, whole: OfTaps, shared: [f64; 3]) -> OfTaps {
         std::array::from_fn(|index| {
             let slope = self.slopes.get(index / 3).copied().unwrap_or_default();
             (whole[index] - slope * slope * shared[index % 3]).max(0.0)
@@ -117,7 +117,7 @@ impl PixelTaps {
     }
 
     /// The variances of the classes behind each amplifier, as all photosites read such levels above black.
-    fn at(&self, level: [f64; 3]) -> [f64; 3 * TAPS] {
+    fn at(&self, level: [f64; 3]) -> OfTaps {
         std::array::from_fn(|index| {
             let (tap, class) = (index / 3, index % 3);
             let of_tap = self.variances.get(tap).map(|variances| variances[class].at(level[class] - self.shifts[tap]));
@@ -186,8 +186,8 @@ impl PixelNoise {
         let kinds: Vec<[usize; 2]> = places().collect();
         let tap = tap_of_place(frame).filter(|_| frame.taps().is_some());
         let gain = |place: [isize; 2]| tap.as_ref().map_or(1.0, |tap| relative_slope(frame, tap(place)));
-        let of_lines = photosite
-            .has_lines()
+        let is_bent_by_tap = frame.taps().is_some() && photosite.adc.is_some_and(|adc| adc.is_bent());
+        let of_lines = (photosite.has_lines() && !is_bent_by_tap)
             .then(|| PixelLines::of(photosite, average.as_ref(), table, &kinds, &frame.geometry, gain));
         let of_black = metadata
             .black_noise
@@ -223,7 +223,19 @@ impl PixelNoise {
                 variances.iter_mut().zip(shared).for_each(off);
             }
             let mut covariance = match of_taps {
-                Some((taps, whole)) => taps.gains[kind].covariance(taps.own(whole, shared.unwrap_or_default()), hues),
+                Some((taps, whole)) => {
+                    let lines = taps.lines.as_ref().map(|lines| (lines, lines.at(level)));
+                    let own = match &lines {
+                        Some((lines, level)) => lines.own(whole, level),
+                        None => taps.own(whole, shared.unwrap_or_default()),
+                    };
+                    let mut covariance = taps.gains[kind].covariance(own, hues);
+                    if let Some((lines, level)) = &lines {
+                        let more = lines.covariance(kind, y, level, hues);
+                        covariance.iter_mut().zip(more).for_each(|(covariance, more)| *covariance += more);
+                    }
+                    covariance
+                }
                 None => self.gains[kind].covariance(variances, hues),
             };
             if let Some((lines, level)) = &lines {
@@ -271,10 +283,6 @@ fn places(frame: &FrameHeader, reach: usize) -> [Places; 2] {
     })
 }
 
-/// Why nothing is said of what rows and columns share behind amplifiers of a bent converter.
-const BENT_TAPS: &str = "its rows or columns share noise, several amplifiers (`taps` of the sensor) read them, and the curve of the converter \
-                         (`linearization`) bends what each makes of it";
-
 /// The slope of what an amplifier makes of the samples of a frame, relative to that of the sensor.
 fn relative_slope(frame: &FrameHeader, tap: usize) -> f64 {
     let are_codes = quantity_of_sites(frame) == QuantityKind::Adu;
@@ -295,27 +303,26 @@ fn pixel_taps(
     average: Option<&AverageRecord>,
     one: &Photosite,
 ) -> Result<PixelTaps> {
-    if one.drifts() {
-        return Err(frame.refuse(TAPPED_DRIFT));
-    }
-    if one.has_lines() && one.adc.is_some_and(|adc| adc.is_bent()) {
-        return Err(frame.refuse(BENT_TAPS));
-    }
     if one.flat.is_some() {
         return Err(frame.refuse(taps::FLATTENED));
     }
     let tap = tap_of_place(frame).ok_or_else(|| frame.missing("sensor.readout"))?;
-    let gains = examples.into_iter().map(|at| PixelGains::of_taps(table, at, &frame.geometry, &tap)).collect();
-    let (mut variances, mut shifts, mut slopes) = (Vec::new(), Vec::new(), Vec::new());
+    let gains = examples.iter().map(|at| PixelGains::of_taps(table, *at, &frame.geometry, &tap)).collect();
+    let (mut photosites, mut variances, mut shifts, mut slopes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for tap in 0..frame.taps().map_or(0, Taps::count) {
         let (photosite, _) = photosite_of(&taps::of_tap(frame, tap))?;
         photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
         let largest = photosite.model.full_well_e * photosite.slope();
         slopes.push(relative_slope(frame, tap));
-        shifts.push(photosite.moments(0.0).moments.mean - one.moments(0.0).moments.mean);
+        let shift = photosite.moments(0.0).moments.mean - one.moments(0.0).moments.mean;
+        shifts.push(shift);
+        photosites.push((photosite, shift));
         variances.push(LevelVariance::of_classes(&photosite, average, largest));
     }
-    Ok(PixelTaps { gains, variances, shifts, slopes })
+    let is_bent = one.has_lines() && one.adc.is_some_and(|adc| adc.is_bent());
+    let of_lines = || PixelTapLines::of(photosites, average, table, &examples, &frame.geometry, &tap);
+    let lines = if is_bent { of_lines() } else { None };
+    Ok(PixelTaps { gains, variances, shifts, slopes, lines })
 }
 
 /// The photosites that a demosaicked frame was made of, and what no light reads in it, in the unit of its samples.

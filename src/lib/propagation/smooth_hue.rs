@@ -20,6 +20,7 @@ pub fn hues(mean: [f64; 3]) -> [f64; 2] {
     [Class::Red, Class::Blue].map(|class| if green > 0.0 { mean[class as usize] / green } else { 1.0 })
 }
 
+pub(super) mod expansion;
 mod sharing;
 
 /// How far green is from where smooth hue transition would divide by zero.
@@ -80,7 +81,7 @@ pub fn second_order(
     let covariance = SiteCovariance::of(sites);
     let moments = [0, 1, 2, 3].map(|phase| {
         if !covariance.is_independent() {
-            return sharing::of_phase(pattern, phase, mean, sites);
+            return sharing::of_phase(pattern, phase, mean, sites, &weights);
         }
         let linear = gains::pixel(&weights, phase).covariance(variances);
         of_phase(pattern, phase, mean, sites, linear)
@@ -288,6 +289,22 @@ mod tests {
                 b.covariance
             );
             assert!((0..3).all(|i| (a.bias[i] - b.bias[i]).abs() < 1e-9), "{a:?} {b:?}");
+        }
+    }
+
+    /// A drift over far more rows than a pixel has, and no other noise, adds one number z to all: (x̄ + κ_x z)(ḡ + κ z)/(ḡ + κ z), whatever
+    /// the fourth order leaves out of it.
+    #[test]
+    fn a_drift_of_all_photosites_together_divides_out() {
+        let mean = [30.0, 60.0, 200.0];
+        let site = Prediction::of_cumulants(0.0, 4.0, 0.0, 0.0);
+        for (rows, variance) in [(1e9, 4.0), (2.0, 4.0)] {
+            let lines = LineCovariance { row: [4.0; 3], drift: [4.0; 3], drift_rows: rows, ..Default::default() };
+            let found =
+                second_order(Method::SmoothHue, CfaPattern::Grbg, mean, &[Prediction { lines, ..site }; 3]).unwrap();
+            let is_one = (found.covariance - Matrix3::from_element(variance)).abs().max() < 1e-5;
+            assert_eq!(is_one, rows > 1e8, "{rows}: {}", found.covariance);
+            assert_eq!(found.bias.iter().all(|bias| bias.abs() < 1e-9), rows > 1e8, "{rows}: {:?}", found.bias);
         }
     }
 

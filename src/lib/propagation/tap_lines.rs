@@ -6,11 +6,13 @@
 //! cov(y_ak, y_bl) = cov(m_ak(u, v), m_bl(u, v)),  m_ak(u, v) = E\[y_ak | u, v]
 //!
 //! and so for columns. Where codes follow straight each has its own slope, g_ak g_bl \[σ² + E_k E_l s²].
+//!
+//! A drift of the black level is one number of a row, which all amplifiers meet with their slopes.
 
 use super::bent_lines::BentLine;
 use super::law::Law;
 use super::line_sums::{bent, curved};
-use super::lines::{Axis, TAPPED_DRIFT};
+use super::lines::{Axis, DRIFT_CUT};
 use super::moments::Prediction;
 use super::photosite::Photosite;
 use super::unpredictable::{Predicted, Unpredictable};
@@ -23,14 +25,42 @@ pub(super) type Lit = (Photosite, [f64; 3]);
 /// Covariances of photosites that share a row, and of those that share a column, by amplifiers and classes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TapLines {
-    /// Of two in a row: class k of the group g stands at 3 g + k.
+    /// Of two in a row, its drift included: class k of the group g stands at 3 g + k.
     pub row: DMatrix<f64>,
+    /// What of that is drift of the black level; none where it does not drift.
+    pub drift: Option<TapDrift>,
     /// Of two in a column.
     pub column: DMatrix<f64>,
     /// Of three planes: what samples of one place share beyond what they do by row and by column, by group.
     pub together: Vec<Matrix3<f64>>,
     /// How photosites of a row, and of a column, go together beyond these; none where they follow what they share straight.
     pub bent: [Option<BentLine>; 2],
+}
+
+/// The drift of the black level, which rows near each other share in part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapDrift {
+    /// Its rms in the samples of a class of a group, where these stand in [`TapLines::row`].
+    pub scales: Vec<f64>,
+    /// Rows from one knot to the next.
+    pub rows_per_knot: f64,
+}
+
+impl TapDrift {
+    /// Of photosites of such moments behind each of some amplifiers; none where they do not drift.
+    fn of(moments: &[[Prediction; 3]]) -> Option<Self> {
+        let lines =
+            moments.iter().flat_map(|sites| [0, 1, 2].map(|k| (sites[k].lines.drift[k], sites[k].lines.drift_rows)));
+        let (variances, rows): (Vec<f64>, Vec<f64>) = lines.unzip();
+        let rows_per_knot = rows.into_iter().fold(0.0, f64::max);
+        let scales: Vec<f64> = variances.into_iter().map(|variance| variance.max(0.0).sqrt()).collect();
+        scales.iter().any(|scale| *scale > 0.0).then_some(Self { scales, rows_per_knot })
+    }
+
+    /// What two photosites that stand at such places share in a row.
+    pub fn between(&self, one: usize, other: usize) -> f64 {
+        self.scales[one] * self.scales[other]
+    }
 }
 
 impl TapLines {
@@ -48,9 +78,6 @@ impl TapLines {
         if !sites.iter().any(|(photosite, _)| photosite.has_lines()) {
             return Ok(None);
         }
-        if sites.iter().any(|(photosite, _)| photosite.drifts()) {
-            return Err(Unpredictable::Beyond(TAPPED_DRIFT));
-        }
         let mut whole = shared(sites)?;
         if let Some(record) = average {
             let one = sites.iter().map(|(photosite, expected_e)| (photosite.one_exposure(), *expected_e));
@@ -61,8 +88,9 @@ impl TapLines {
         }
         let [row, column] = whole;
         let together = |sites: &[Prediction; 3]| Matrix3::from_fn(|k, l| sites[k].lines.together[l]);
+        let drift = TapDrift::of(moments);
         let bent = bent_lines(sites, average.map(|record| record.frames))?;
-        Ok(Some(Self { row, column, together: moments.iter().map(together).collect(), bent }))
+        Ok(Some(Self { row, drift, column, together: moments.iter().map(together).collect(), bent }))
     }
 
     /// What of that is the same in every exposure.
@@ -72,12 +100,23 @@ impl TapLines {
     /// As [`Self::of`].
     pub(super) fn fixed(sites: &[Lit]) -> Predicted<Self> {
         let [row, column] = fixed(sites)?;
-        Ok(Self { row, column, together: vec![Matrix3::zeros(); sites.len()], bent: [None, None] })
+        let together = vec![Matrix3::zeros(); sites.len()];
+        Ok(Self { row, drift: None, column, together, bent: [None, None] })
     }
 
     /// The matrices of rows and of columns.
     pub fn axes(&self) -> [&DMatrix<f64>; 2] {
         [&self.row, &self.column]
+    }
+
+    /// What two photosites that stand at such places share in a row of the drift of its black level.
+    pub fn drift(&self, one: usize, other: usize) -> f64 {
+        self.drift.as_ref().map_or(0.0, |drift| drift.between(one, other))
+    }
+
+    /// The same of what is their row's alone.
+    pub fn row_alone(&self, one: usize, other: usize) -> f64 {
+        self.row[(one, other)] - self.drift(one, other)
     }
 
     /// What of the variance of photosites that stand at such a place is their own.
@@ -119,6 +158,10 @@ fn bent_lines(sites: &[Lit], frames: Option<u32>) -> Predicted<[Option<BentLine>
     let bends = sites.iter().map(|(photosite, expected_e)| photosite.bends_lines(*expected_e));
     if !bends.collect::<Predicted<Vec<bool>>>()?.contains(&true) {
         return Ok([None, None]);
+    }
+    // Rows that drift are not drawn apart.
+    if sites.iter().any(|(photosite, _)| photosite.drifts()) {
+        return Err(Unpredictable::Beyond(DRIFT_CUT));
     }
     // What comes off adds to what is shared alone.
     let codes: Vec<Lit> =

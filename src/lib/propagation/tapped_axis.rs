@@ -39,7 +39,7 @@ impl Axis {
 
     /// The kinds of lines by what is around them, so far to either side, and one of each kind with their number; with `tells_rim` lines
     /// of the rectangle are told from those beside it.
-    fn alike(&self, lines: Range<usize>, far: usize, tells_rim: bool) -> (Vec<usize>, Vec<(usize, f64)>) {
+    pub fn alike(&self, lines: Range<usize>, far: usize, tells_rim: bool) -> (Vec<usize>, Vec<(usize, f64)>) {
         let code = |place: Option<usize>| {
             let found = place.and_then(|place| Some((place, *self.codes.get(place)?)));
             found.map_or(OUTSIDE, |(place, code)| {

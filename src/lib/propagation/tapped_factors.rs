@@ -3,7 +3,11 @@
 //!
 //! The covariance R of two photosites of a row, by amplifiers and classes, is Σ_ρ λ_ρ u_ρ u_ρᵀ. Pixel a has of the factor ρ of row r what its
 //! photosites there have, ℓ_a(r, ρ) = Σ_s w_a(s) u_ρ(s); so pixels a and b, however far apart in it, share Σ_rρ λ_ρ ℓ_a(r, ρ) ℓ_b(r, ρ)ᵀ.
+//!
+//! A drift of the black level is one factor more, of which rows near each other have a part in common: on average over their places
+//! c(r − r′) of it ([`super::drift::covariance`]).
 
+use super::drift;
 use super::moments::Prediction;
 use super::tap_lines::TapLines;
 use crate::stages::demosaic::stencil::REACH;
@@ -19,11 +23,10 @@ pub(super) struct Factors {
 }
 
 impl Factors {
-    /// Of the covariances of photosites of groups, which are of such amplifiers.
-    pub fn of(covariance: &DMatrix<f64>, taps: &[usize]) -> Self {
-        let found = covariance.clone().symmetric_eigen();
-        let most = found.eigenvalues.amax();
-        let count = 3 * taps.iter().map(|tap| tap + 1).max().unwrap_or_default();
+    /// Of the covariances of photosites of groups, which are of such amplifiers, as parts of numbers as large as `most`.
+    pub fn of(covariance: DMatrix<f64>, most: f64, taps: &[usize]) -> Self {
+        let found = covariance.symmetric_eigen();
+        let count = number_of(taps);
         let mut factors = Self { values: Vec::new(), loads: Vec::new() };
         for (value, vector) in found.eigenvalues.iter().zip(found.eigenvectors.column_iter()) {
             // What is left of a matrix of lower rank is rounding.
@@ -51,6 +54,11 @@ impl Factors {
         Self { values: Vec::new(), loads: Vec::new() }
     }
 
+    /// What a photosite of an amplifier and class has of the first.
+    pub fn load(&self, tap: usize, class: usize) -> f64 {
+        self.loads.first().and_then(|loads| loads.get(3 * tap + class)).copied().unwrap_or_default()
+    }
+
     /// What pixels have of each, `sites` being their photosites: how many lines they are away, of which amplifier and class, and their
     /// weights.
     pub fn of_pixel(&self, sites: impl Iterator<Item = (isize, [usize; 2], [f64; 3])>) -> Loads {
@@ -71,6 +79,100 @@ impl Factors {
         let load = |loads: &Vec<f64>, at: usize| loads.get(at).copied().unwrap_or_default();
         let both = |loads: &Vec<f64>| load(loads, 3 * tap + class) * load(loads, 3 * other + of_other);
         self.values.iter().zip(&self.loads).map(|(value, loads)| value * both(loads)).sum()
+    }
+}
+
+/// Photosites of amplifiers up to the last, by class.
+fn number_of(taps: &[usize]) -> usize {
+    3 * taps.iter().map(|tap| tap + 1).max().unwrap_or_default()
+}
+
+/// A drift of the black level, as one factor of each row.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Drifting {
+    /// Of variance 1.
+    pub factors: Factors,
+    /// Rows from one knot to the next.
+    pub rows_per_knot: f64,
+}
+
+impl Drifting {
+    /// What a pixel shares with itself of such loads by rows, on average over their places.
+    fn covariance(&self, loads: &Loads) -> Matrix3<f64> {
+        let each =
+            || (-REACH..=REACH).flat_map(|row| loads.at(row).iter().map(move |load| (row, Vector3::from(*load))));
+        let of = |(row, load): (isize, Vector3<f64>)| -> Matrix3<f64> {
+            let with = |(other, theirs): (isize, Vector3<f64>)| {
+                drift::covariance((row - other) as f64 / self.rows_per_knot) * theirs
+            };
+            load * each().map(with).sum::<Vector3<f64>>().transpose()
+        };
+        each().map(of).sum()
+    }
+}
+
+/// What photosites share.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Shared {
+    /// By rows and by columns.
+    pub lines: [Factors; 2],
+    /// By rows that are near each other.
+    pub drift: Option<Drifting>,
+}
+
+impl Shared {
+    /// Of photosites of groups, which are of such amplifiers.
+    fn of(lines: &TapLines, taps: &[usize]) -> Self {
+        let [row, column] = lines.axes();
+        let alone = DMatrix::from_fn(row.nrows(), row.ncols(), |a, b| lines.row_alone(a, b));
+        let drift = lines.drift.as_ref().map(|drift| {
+            let group = |tap: usize| taps.iter().position(|of| *of == tap);
+            let load = |tap, class| group(tap).map_or(0.0, |group| drift.scales[3 * group + class]);
+            let factors = Factors::single(number_of(taps) / 3, load);
+            Drifting { factors, rows_per_knot: drift.rows_per_knot }
+        });
+        let lines = [Factors::of(alone, row.amax(), taps), Factors::of(column.clone(), column.amax(), taps)];
+        Self { lines, drift }
+    }
+
+    /// One factor alone, of rows (0) or columns (1), or where rows have knots, a drift of these.
+    pub fn single(axis: usize, factors: Factors, rows_per_knot: Option<f64>) -> Self {
+        match rows_per_knot {
+            Some(rows_per_knot) => {
+                Self { lines: [Factors::none(), Factors::none()], drift: Some(Drifting { factors, rows_per_knot }) }
+            }
+            None if axis == 0 => Self { lines: [factors, Factors::none()], drift: None },
+            None => Self { lines: [Factors::none(), factors], drift: None },
+        }
+    }
+
+    /// What two photosites of a pixel share that lies at such a place among the knots of the drift.
+    pub fn between(&self, one: &Site, other: &Site, place: f64) -> f64 {
+        let [mine, theirs] = [one, other].map(|site| [site.tap, site.class]);
+        let of_axis = |axis: usize| {
+            let is_shared = one.offset[1 - axis] == other.offset[1 - axis];
+            if is_shared { self.lines[axis].between(mine, theirs) } else { 0.0 }
+        };
+        let of_drift = self.drift.as_ref().map_or(0.0, |drift| {
+            let [row, other_row] = [one, other].map(|site| place + site.offset[1] as f64 / drift.rows_per_knot);
+            drift.factors.between(mine, theirs) * drift::between(row, other_row)
+        });
+        of_axis(0) + of_axis(1) + of_drift
+    }
+
+    /// What a pixel of such photosites has of what they share by rows, by columns, and by the drift of rows.
+    pub fn loads(&self, sites: &[Site]) -> [Loads; 3] {
+        let none = Factors::none();
+        let drift = self.drift.as_ref().map_or(&none, |drift| &drift.factors);
+        [(&self.lines[0], 0), (&self.lines[1], 1), (drift, 0)].map(|(factors, axis)| loads(sites, factors, axis))
+    }
+
+    /// What a pixel of such photosites shares with itself.
+    fn covariance(&self, sites: &[Site]) -> Matrix3<f64> {
+        let [rows, columns, drifting] = self.loads(sites);
+        let of_lines = rows.covariance(&rows, 0, &self.lines[0].values);
+        let of_drift = self.drift.as_ref().map(|drift| drift.covariance(&drifting));
+        of_lines + columns.covariance(&columns, 0, &self.lines[1].values) + of_drift.unwrap_or_default()
     }
 }
 
@@ -124,19 +226,14 @@ pub(super) fn product(a: &[f64; 3], b: &[f64; 3]) -> Matrix3<f64> {
 }
 
 /// What a pixel of such photosites has of what they share by an axis.
-pub(super) fn loads(sites: &[Site], factors: &Factors, axis: usize) -> Loads {
+fn loads(sites: &[Site], factors: &Factors, axis: usize) -> Loads {
     factors.of_pixel(sites.iter().map(|site| (site.offset[1 - axis], [site.tap, site.class], site.weights)))
 }
 
-/// To first order, the covariance of a pixel of photosites that have such variances by themselves, and share such factors.
-pub(super) fn first_order(sites: &[Site], own: impl Fn(&Site) -> f64, factors: Option<&[Factors; 2]>) -> Matrix3<f64> {
+/// To first order, the covariance of a pixel of photosites that have such variances by themselves, and share so much.
+pub(super) fn first_order(sites: &[Site], own: impl Fn(&Site) -> f64, shared: Option<&Shared>) -> Matrix3<f64> {
     let own: Matrix3<f64> = sites.iter().map(|site| own(site) * product(&site.weights, &site.weights)).sum();
-    let of_axis = |axis: usize, factors: &Factors| {
-        let loads = loads(sites, factors, axis);
-        loads.covariance(&loads, 0, &factors.values)
-    };
-    let shared = factors.map(|factors| of_axis(0, &factors[0]) + of_axis(1, &factors[1]));
-    shared.map_or(own, |shared| own + shared)
+    shared.map_or(own, |shared| own + shared.covariance(sites))
 }
 
 /// Moments of photosites behind each of some amplifiers, of one exposure or of their means over exposures.
@@ -149,7 +246,7 @@ pub struct TapMoments {
     /// What of their third and fourth cumulants is.
     pub(super) cumulants: Vec<[[f64; 2]; 3]>,
     /// What they share by rows and by columns; none where they share nothing.
-    pub(super) factors: Option<[Factors; 2]>,
+    pub(super) shared: Option<Shared>,
     /// Which of the groups are of an amplifier.
     groups: Vec<usize>,
 }
@@ -164,7 +261,7 @@ impl TapMoments {
             sites: vec![none; count],
             own: vec![[0.0; 3]; count],
             cumulants: vec![[[0.0; 2]; 3]; count],
-            factors: lines.map(|lines| lines.axes().map(|line| Factors::of(line, &taps))),
+            shared: lines.map(|lines| Shared::of(lines, &taps)),
             groups: vec![0; count],
         };
         for (index, (tap, sites)) in groups.iter().enumerate() {
@@ -185,6 +282,11 @@ impl TapMoments {
         found
     }
 
+    /// Whether rows share the drift of the black level.
+    pub(super) fn drifts(&self) -> bool {
+        self.shared.as_ref().is_some_and(|shared| shared.drift.is_some())
+    }
+
     /// Where photosites of an amplifier and class stand in what lines share.
     pub(super) fn place(&self, tap: usize, class: usize) -> usize {
         3 * self.groups[tap] + class
@@ -192,6 +294,6 @@ impl TapMoments {
 
     /// To first order, the covariance of a pixel of such photosites.
     pub(super) fn first_order(&self, sites: &[Site]) -> Matrix3<f64> {
-        first_order(sites, |site| self.own[site.tap][site.class], self.factors.as_ref())
+        first_order(sites, |site| self.own[site.tap][site.class], self.shared.as_ref())
     }
 }

@@ -18,6 +18,7 @@ use super::line_sampling::Nonlocal;
 use super::place::add_products;
 use super::sampling::Sampling;
 use super::tapped::{Kind, TappedPixels};
+use super::tapped_drift::RowProducts;
 use super::tapped_shares::Shares;
 use nalgebra::{Matrix3, Vector3};
 
@@ -82,12 +83,13 @@ impl Sums {
             rows.into_iter().flat_map(both).collect::<Vec<_>>()
         };
         let shares = Shares::of(pixels);
-        let mut of_shared = [[0.0; 6]; 6];
+        let mut of_shared = RowProducts::default();
         for (at, times) in places(false) {
             sums.add_pixel(pixels, shares.as_ref(), at, times, &mut of_shared);
         }
         if let Some(shares) = &shares {
-            sums.shared = Some(shares.sums(of_shared));
+            sums.shared = Some(shares.sums(&of_shared));
+            sums.distances[1].iter_mut().zip(shares.squares_of_drift()).for_each(|(sum, of)| *sum += of);
             let of_distances = shares.of_distances();
             sums.of_distances.iter_mut().flatten().zip(of_distances.iter().flatten()).for_each(|(sum, of)| *sum += of);
         }
@@ -104,7 +106,7 @@ impl Sums {
         shares: Option<&Shares<'_>>,
         at: [usize; 2],
         times: f64,
-        of_shared: &mut [[f64; 6]; 6],
+        of_shared: &mut RowProducts,
     ) {
         let off = |kind: &Kind| Vector3::from(pixels.off(kind));
         let pixel = pixels.kind(at);
@@ -113,30 +115,32 @@ impl Sums {
             let covariance = pixel.covariance_with(other, lag);
             row_sum += covariance;
             moved += covariance.diagonal().component_mul(&off(other));
-            let shared = shares.map(|shares| shares.covariance(pixel, other, lag));
+            let shared = shares.map(|shares| shares.covariance(pixel, other, at[1], lag));
             add_with(&mut self.products, &covariance, shared.as_ref(), times);
             (0..3).for_each(|i| self.own[i][0] += times * covariance[(i, i)].powi(2));
         }
         let itself = pixel.covariance_with(pixel, [0, 0]);
-        let shared = shares.map(|shares| shares.covariance(pixel, pixel, [0, 0])).unwrap_or_default();
+        let shared = shares.map(|shares| shares.covariance(pixel, pixel, at[1], [0, 0])).unwrap_or_default();
         self.variance += times * (itself + shared);
         self.total += times * row_sum;
         self.between += times * off(pixel) * off(pixel).transpose();
         self.beyond += times * pixel.beyond;
-        let further = shares.map(|shares| shares.row_sum(pixel, at));
-        add_with(&mut self.row_products, &row_sum, further.as_ref().map(|(further, _)| further), times);
-        let transposed = further.as_ref().map(|(further, _)| further.transpose());
-        add_with(&mut self.row_products, &row_sum.transpose(), transposed.as_ref(), times);
-        if let Some((further, of_distances)) = further {
-            moved += Vector3::from(of_distances);
-            add_products(of_shared, &further, times);
-            add_products(of_shared, &further.transpose(), times);
+        let further = shares.map(|shares| (shares.row_sum(pixel, at), shares.drift_sum(pixel, at[1])));
+        let all = further.as_ref().map(|((lines, _), (drift, _))| lines + drift);
+        add_with(&mut self.row_products, &row_sum, all.as_ref(), times);
+        add_with(&mut self.row_products, &row_sum.transpose(), all.map(|all| all.transpose()).as_ref(), times);
+        let mut by_drift = [0.0; 3];
+        if let Some(((lines, of_lines), (drift, of_drift))) = further {
+            moved += Vector3::from(of_lines);
+            by_drift = of_drift;
+            of_shared.add(&lines, &drift, times);
         }
         for i in 0..3 {
             self.own[i][1] += times * itself[(i, i)];
             self.own[i][2] += times * row_sum[(i, i)];
-            self.distances[0][i] += times * moved[i];
-            self.distances[1][i] += times * moved[i] * moved[i];
+            self.distances[0][i] += times * (moved[i] + by_drift[i]);
+            // Squares of what the drift makes of them are sums of their own.
+            self.distances[1][i] += times * moved[i] * (moved[i] + 2.0 * by_drift[i]);
         }
     }
 
@@ -216,7 +220,7 @@ mod tests {
     use super::super::moments::{LineCovariance, Prediction};
     use super::super::sampling::Place;
     use super::super::spaces::{Channels, Curved};
-    use super::super::tap_lines::TapLines;
+    use super::super::tap_lines::{TapDrift, TapLines};
     use super::super::taps::Group;
     use super::*;
     use crate::camera::sensor::tests::kaf5101ce;
@@ -227,8 +231,19 @@ mod tests {
     use crate::names::Named;
     use crate::stages::demosaic::Method;
     use crate::stages::demosaic::weights::WeightTable;
+    use crate::stages::noise::knots;
     use crate::units::QuantityKind;
     use nalgebra::{DMatrix, DVector};
+
+    const ROWS_PER_KNOT: f64 = 4.3;
+
+    /// Covariance of two rows of a drift of variance 1, by the knot before each and the weights of it and the next.
+    fn between([(j, [a, b]), (k, [c, d])]: [(i64, [f64; 2]); 2]) -> f64 {
+        [(j, a), (j + 1, b)]
+            .iter()
+            .flat_map(|(m, x)| [(k, c), (k + 1, d)].map(|(n, y)| if *m == n { x * y } else { 0.0 }))
+            .sum()
+    }
 
     const PLANE: [i64; 4] = [3, 2, 33, 28];
     const PART: [usize; 4] = [4, 0, 27, 25];
@@ -271,8 +286,9 @@ mod tests {
             let mut found = Prediction::of_cumulants(mean, own + shared, third, fourth);
             if let Some(lines) = lines {
                 let of_axis = |line: &DMatrix<f64>| [0, 1, 2].map(|l| line[(place, 3 * tap + l)]);
-                found.lines =
-                    LineCovariance { row: of_axis(&lines.row), column: of_axis(&lines.column), ..Default::default() };
+                let drift = [0, 1, 2].map(|l| lines.drift(place, 3 * tap + l));
+                let (row, column) = (of_axis(&lines.row), of_axis(&lines.column));
+                found.lines = LineCovariance { row, column, drift, drift_rows: ROWS_PER_KNOT, ..Default::default() };
             }
             found
         };
@@ -280,7 +296,11 @@ mod tests {
     }
 
     /// What photosites of as many amplifiers share, which differ by a share in what they make of it: of ranks 2 and 3.
-    fn lines(count: usize, by: f64) -> TapLines {
+    fn lines(count: usize, by: f64, drifts: bool) -> TapLines {
+        let scale = |place: usize| (1.0 + 0.3 * by * (place / 3) as f64) * [0.9, 1.2, 0.6][place % 3];
+        let scales: Vec<f64> = (0..3 * count).map(scale).collect();
+        let of_drift = DMatrix::from_fn(3 * count, 3 * count, |a, b| if drifts { scales[a] * scales[b] } else { 0.0 });
+        let drift = drifts.then_some(TapDrift { scales, rows_per_knot: ROWS_PER_KNOT });
         let load = |axis: usize, place: usize| {
             let (more, k) = (by * (place / 3) as f64, place % 3);
             let gain = 1.0 + 0.3 * more;
@@ -293,45 +313,51 @@ mod tests {
                 (0..3).map(|factor| a[factor] * b[factor]).sum()
             })
         };
-        TapLines { row: of(0), column: of(1), together: vec![Matrix3::zeros(); count], bent: [None, None] }
+        let together = vec![Matrix3::zeros(); count];
+        TapLines { row: of(0) + of_drift, drift, column: of(1), together, bent: [None, None] }
     }
 
     /// Taps that are alike are one: sums in another order, relative 10⁻¹².
     #[test]
     fn taps_that_are_alike_are_one() {
-        for ((method, layout, count), is_shared) in [
+        for ((method, layout, count), (is_shared, drifts)) in [
             (Method::Bilinear, TapLayout::Columns, 3),
             (Method::EffectiveColor, TapLayout::Quadrants, 4),
             (Method::Malvar, TapLayout::LeftRight, 2),
+            (Method::SmoothHue, TapLayout::Columns, 2),
         ]
         .into_iter()
-        .flat_map(|case| [(case, false), (case, true)])
+        .flat_map(|case| [(false, false), (true, false), (true, true)].map(|shared| (case, shared)))
         {
-            let lines = is_shared.then(|| lines(count, 0.0));
+            let lines = is_shared.then(|| lines(count, 0.0, drifts));
             let groups = groups(count, 0.0, lines.as_ref());
             let frame = frame(method, layout, count);
             let pixels = TappedPixels::of(&frame, &channels(), 10.0, &groups, lines.as_ref()).unwrap();
             let [x, y, width, height] = PART;
             let place = Place { frame: [33, 28], origin: [3, 2], corner: [x, y], size: [width, height] };
-            let weights = WeightTable::new(method, CfaPattern::Gbrg).about([1.0; 2]).through(&channels().matrix);
+            let weights = WeightTable::new(method, CfaPattern::Gbrg).about([0.75, 1.25]).through(&channels().matrix);
             let (found, one) = (pixels.sampling(), Sampling::of(&weights, &groups[0].1.sites, &place));
             let close =
                 |found: f64, one: f64, scale: f64| assert!((found - one).abs() < 1e-12 * scale, "{found} {one}");
             for (a, [i, j]) in PAIRS.into_iter().enumerate() {
                 let scale = |of: &Matrix3<f64>| (of[(i, i)] * of[(j, j)]).sqrt();
-                close(found.covariance[(i, j)], one.covariance[(i, j)], scale(&one.covariance));
+                // Beyond the first order, places at the edges are others.
+                let of_hue = if method == Method::SmoothHue { 1e10 } else { 1.0 };
+                close(found.covariance[(i, j)], one.covariance[(i, j)], of_hue * scale(&one.covariance));
                 close(found.mean_covariance[(i, j)], one.mean_covariance[(i, j)], scale(&one.mean_covariance));
                 for b in 0..6 {
-                    close(found.spread[a][b], one.spread[a][b], (one.spread[a][a] * one.spread[b][b]).sqrt());
+                    let scale = (one.spread[a][a] * one.spread[b][b]).sqrt();
+                    close(found.spread[a][b], one.spread[a][b], of_hue.min(1e7) * scale);
                 }
             }
             if is_shared {
                 let thirds = [found, &one].map(|law| law.variance_thirds.unwrap());
                 // Places of whose growth large ones follow do not reach over three lines and their pixels.
-                (0..3).for_each(|i| close(thirds[0][i], thirds[1][i], 1e5 * thirds[1][i]));
+                let of_hue = if method == Method::SmoothHue { 1e8 } else { 1e5 };
+                (0..3).for_each(|i| close(thirds[0][i], thirds[1][i], of_hue * thirds[1][i]));
             }
             let mean = channels().matrix * Vector3::new(88.0, 118.0, 148.0);
-            (0..3).for_each(|i| close(pixels.mean[i], mean[i], mean[i]));
+            (0..3).for_each(|i| close(pixels.mean[i] - pixels.bias[i], mean[i], mean[i]));
         }
     }
 
@@ -341,11 +367,11 @@ mod tests {
         let white = [120.0, 130.0, 140.0];
         let lab = Channels { space: Some(Curved::Lab(white)), ..channels() };
         for (method, layout, count, channels) in [
-            (Method::Bilinear, TapLayout::Columns, 3, channels()),
+            (Method::SmoothHue, TapLayout::Columns, 3, channels()),
             (Method::EffectiveColor, TapLayout::Quadrants, 4, channels()),
             (Method::Bilinear, TapLayout::TopBottom, 2, lab),
         ] {
-            for lines in [None, Some(lines(count, 1.0))] {
+            for lines in [None, Some(lines(count, 1.0, false)), Some(lines(count, 1.0, true))] {
                 let frame = frame(method, layout, count);
                 let groups = groups(count, 1.0, lines.as_ref());
                 let pixels = TappedPixels::of(&frame, &channels, 10.0, &groups, lines.as_ref()).unwrap();
@@ -390,7 +416,12 @@ mod tests {
             let shared = |line: &DMatrix<f64>, axis: usize| {
                 if at(s)[axis] == at(t)[axis] { line[(place(s), place(t))] } else { 0.0 }
             };
-            let shared = lines.map_or(0.0, |lines| shared(&lines.row, 1) + shared(&lines.column, 0));
+            let of_rows = [at(s)[1], at(t)[1]].map(|row| knots(PLANE[1] + row as i64, ROWS_PER_KNOT));
+            let shared = lines.map_or(0.0, |lines| {
+                let drift = lines.drift(place(s), place(t));
+                let alone = if at(s)[1] == at(t)[1] { lines.row_alone(place(s), place(t)) } else { 0.0 };
+                alone + drift * between(of_rows) + shared(&lines.column, 0)
+            });
             shared + if s == t { pixels.array.own(at(s)) } else { 0.0 }
         })
     }
@@ -455,7 +486,9 @@ mod tests {
         for i in 0..3 {
             let all = (&weights[i] * &second).dot(&weights[i]);
             let first_order = pixels.first_order();
-            close(first_order[(i, i)], all / count, first_order[(i, i)]);
+            // A drift counts there as over all places among the knots; here it has six of them.
+            let over_places = if lines.is_some_and(|lines| lines.drift.is_some()) { 1e9 } else { 1.0 };
+            close(first_order[(i, i)], all / count, over_places * first_order[(i, i)]);
             let whole = first_order[(i, i)] + off[i].norm_squared() / count + beyond[(i, i)];
             close(pixels.covariance[(i, i)], whole, whole);
             // Of what is shared third cumulants are told to about a quarter; of what is curved by the first order alone.
@@ -467,7 +500,7 @@ mod tests {
         if lines.is_some() {
             return;
         }
-        let within = pixels.within(None, |tap, class| {
+        let within = pixels.within(None, false, |tap, class| {
             let site = |s: &usize| {
                 let at = [s % columns, s / columns];
                 let [x, y] = [at[0] as i64 + PLANE[0], at[1] as i64 + PLANE[1]];

@@ -3,6 +3,7 @@
 //! Behind one amplifier a photosite is as any other, with the slope, the bias and the read noise of that. Over a frame or a region
 //! photosites are groups of known sizes, one for each amplifier, and not drawn among them.
 
+use super::drift;
 use super::moments::{Equations, LineCovariance, Prediction};
 use super::tap_lines::{Lit, TapLines};
 use super::unpredictable::{Predicted, Unpredictable};
@@ -65,6 +66,10 @@ pub struct Cells {
     pub all: Vec<Cell>,
     /// Whether amplifiers read columns by turns.
     pub are_by_turns: bool,
+    /// The first row on the sensor.
+    pub first_row: i64,
+    /// The kind of each row from it on.
+    pub kinds_of_rows: Vec<usize>,
 }
 
 /// Photosites of the rows of one kind and the columns of one.
@@ -132,14 +137,16 @@ impl TappedSites {
         if all > 0.0 { self.groups[group].counts[class] / all } else { 0.0 }
     }
 
-    /// What two photosites of two classes share on average in a row and in a column: behind one amplifier, or of a plane whose columns go by
-    /// turns, behind any.
-    fn between_classes(&self, k: usize, l: usize) -> [f64; 2] {
-        let Some(lines) = &self.lines else { return [0.0; 2] };
+    /// What two photosites of two classes share on average in a row but for its drift, in a column, and of the drift: behind one amplifier, or of
+    /// a plane whose columns go by turns, behind any.
+    fn between_classes(&self, k: usize, l: usize) -> [f64; 3] {
+        let Some(lines) = &self.lines else { return [0.0; 3] };
         let is_plane = self.cells.are_of_plane();
         let groups = 0..self.groups.len();
-        lines.axes().map(|line| {
-            let of = |g: usize, h: usize| line[(3 * g + k, 3 * h + l)];
+        let of_lines: [&dyn Fn(usize, usize) -> f64; 3] =
+            [&|a, b| lines.row_alone(a, b), &|a, b| lines.column[(a, b)], &|a, b| lines.drift(a, b)];
+        of_lines.map(|line| {
+            let of = |g: usize, h: usize| line(3 * g + k, 3 * h + l);
             if is_plane && self.cells.are_by_turns {
                 let of_group =
                     |g: usize| groups.clone().map(|h| self.share(g, k) * self.share(h, l) * of(g, h)).sum::<f64>();
@@ -173,6 +180,10 @@ impl TappedSites {
     /// Covariance of the mean of so many columns and rows of photosites, on average over their places; of amplifiers of halves of the sensor
     /// behind one.
     pub fn patch_mean(&self, [columns, rows]: [usize; 2]) -> Matrix3<f64> {
+        let of_drift = |lines: &TapLines| {
+            lines.drift.as_ref().map_or(0.0, |drift| drift::of_mean_of_rows(rows, drift.rows_per_knot))
+        };
+        let drift_share = self.lines.as_ref().map_or(0.0, |lines| of_drift(lines));
         let [columns, rows] = [columns as f64, rows as f64];
         let over = |k: usize, of: &dyn Fn(usize) -> f64| -> f64 {
             (0..self.groups.len()).map(|g| self.share(g, k) * of(g)).sum()
@@ -183,14 +194,17 @@ impl TappedSites {
                 return if k == l { over(k, &variance) / (columns * rows) } else { 0.0 };
             };
             if k != l {
-                let [row, column] = self.between_classes(k, l);
+                let [row, column, drift] = self.between_classes(k, l);
                 let together = over(k, &|g| lines.together[g][(k, l)]);
-                return row / rows + column / columns + together / (columns * rows);
+                return row / rows + column / columns + together / (columns * rows) + drift * drift_share;
             }
             let own = over(k, &|g| lines.own(3 * g + k, self.groups[g].sites[k].moments.variance));
             let column = over(k, &|g| lines.column[(3 * g + k, 3 * g + k)]);
-            let row = self.cells.in_rows(Class::ALL[k], columns, |g, h| lines.row[(3 * g + k, 3 * h + k)]);
-            own / (columns * rows) + row / rows + column / columns
+            let in_rows = |of: &dyn Fn(usize, usize) -> f64| {
+                self.cells.in_rows(Class::ALL[k], columns, |g, h| of(3 * g + k, 3 * h + k))
+            };
+            let [row, drift] = [in_rows(&|a, b| lines.row_alone(a, b)), in_rows(&|a, b| lines.drift(a, b))];
+            own / (columns * rows) + row / rows + column / columns + drift * drift_share
         })
     }
 }
@@ -230,13 +244,16 @@ pub(super) fn as_if_one(frame: &FrameHeader) -> Cow<'_, FrameHeader> {
     Cow::Owned(made)
 }
 
-/// Lines of a frame that are alike: one of them, and how many there are.
-fn kinds(first: i64, length: usize, kind: impl Fn(i64) -> [usize; 3]) -> Vec<(i64, f64)> {
+/// Lines of a frame that are alike: one of them, and how many there are; and of which kind each is.
+fn kinds(first: i64, length: usize, kind: impl Fn(i64) -> [usize; 3]) -> (Vec<(i64, f64)>, Vec<usize>) {
     let mut found: BTreeMap<[usize; 3], (i64, f64)> = BTreeMap::new();
-    for line in (0..length).map(|index| first + index as i64) {
+    let all = || (0..length).map(|index| first + index as i64);
+    for line in all() {
         found.entry(kind(line)).or_insert((line, 0.0)).1 += 1.0;
     }
-    found.into_values().collect()
+    let places: BTreeMap<[usize; 3], usize> = found.keys().copied().zip(0..).collect();
+    let of_lines = all().map(|line| places[&kind(line)]).collect();
+    (found.into_values().collect(), of_lines)
 }
 
 /// The amplifiers that have read a frame, and which photosites each; none where the sensor has one.
@@ -255,7 +272,7 @@ fn all_cells(frame: &FrameHeader) -> Option<(Vec<usize>, Cells)> {
             [one, other, usize::from(line.rem_euclid(2) == 1)]
         })
     };
-    let (columns, rows) = (lines(0, x0, width), lines(1, y0, height));
+    let ((columns, _), (rows, kinds_of_rows)) = (lines(0, x0, width), lines(1, y0, height));
     let pattern: Option<CfaPattern> = frame.metadata.cfa.and_then(|array| array.bayer());
     let both = || rows.iter().flat_map(|(y, _)| columns.iter().map(move |(x, _)| [*x, *y]));
     let taps: BTreeSet<usize> = both().map(|at| readout.tap(at)).collect();
@@ -269,7 +286,8 @@ fn all_cells(frame: &FrameHeader) -> Option<(Vec<usize>, Cells)> {
     let all = both().enumerate().map(cell).collect();
     let counts = |lines: &[(i64, f64)]| lines.iter().map(|(_, count)| *count).collect();
     let (rows, columns) = (counts(&rows), counts(&columns));
-    Some((taps, Cells { rows, columns, all, are_by_turns: are_by_turns(frame) }))
+    let are_by_turns = are_by_turns(frame);
+    Some((taps, Cells { rows, columns, all, are_by_turns, first_row: y0, kinds_of_rows }))
 }
 
 /// The parts of a frame that each of its amplifiers reads; one where there is one.

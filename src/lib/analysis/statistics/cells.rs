@@ -16,6 +16,7 @@
 //! and what the third and fourth cumulants of photosites add, and of whole lines where their photosites follow these on a curve, are sums over
 //! small matrices.
 
+use super::cell_drift::{DriftCell, DriftCells, DriftSums, RowKinds};
 use crate::cfa::Class;
 use crate::propagation::Prediction;
 use crate::propagation::bent_lines::{BeyondNormal, LineForm};
@@ -96,7 +97,7 @@ impl<'a> Samples<'a> {
             let places = (self.place(a, i), self.place(b, k));
             let own = if a == b { self.own(a, i, k) } else { 0.0 };
             let row = if has_rows && a.row == b.row {
-                self.lines.row[places] * (kinds.columns[a.column] * kinds.columns[b.column]).sqrt()
+                self.lines.row_alone(places.0, places.1) * (kinds.columns[a.column] * kinds.columns[b.column]).sqrt()
             } else {
                 0.0
             };
@@ -110,6 +111,32 @@ impl<'a> Samples<'a> {
         let of_channels =
             |i: usize, k: usize| DMatrix::from_fn(cells.len(), cells.len(), |a, b| entry(i, k, cells[a], cells[b]));
         Block { times, covariances: std::array::from_fn(|pair| of_channels(pair / 3, pair % 3)) }
+    }
+
+    /// What the drift of the black level adds, of cells whose means are off by so much; none where there is none.
+    fn drift(&self, off: &[DVector<f64>; 3]) -> Option<DriftSums> {
+        let drift = self.lines.drift.as_ref()?;
+        let kinds = &self.sites.cells;
+        let of_cell = |(index, cell): (usize, &&Cell)| DriftCell {
+            row: cell.row,
+            columns: kinds.columns[cell.column],
+            rows: kinds.rows[cell.row],
+            scales: [0, 1, 2].map(|channel| drift.scales[self.place(cell, channel)]),
+            off: [0, 1, 2].map(|channel| off[channel][index]),
+            own: Matrix3::from_fn(|i, k| self.own(cell, i, k)),
+        };
+        let place = |[index, channel]: [usize; 2]| self.place(self.cells[index], channel);
+        let in_column = |one: [usize; 2], other: [usize; 2]| {
+            let is_here = self.cells[one[0]].column == self.cells[other[0]].column;
+            if is_here { self.lines.column[(place(one), place(other))] } else { 0.0 }
+        };
+        let cells = DriftCells {
+            cells: self.cells.iter().enumerate().map(of_cell).collect(),
+            in_row: &|one, other| self.lines.row_alone(place(one), place(other)),
+            in_column: &in_column,
+            rows: RowKinds::of(kinds.first_row, &kinds.kinds_of_rows, drift.rows_per_knot),
+        };
+        Some(cells.sums())
     }
 
     /// All blocks but the one over all cells.
@@ -223,23 +250,29 @@ pub(super) fn sampling(sites: &TappedSites, lines: &TapLines, seen: Seen) -> Sam
     let of_distances = [0, 1, 2].map(of_distances);
     blocks.push(projected);
     let beyond = beyond_normal(&samples, &off, n);
+    let drift = samples.drift(&off);
+    let of_drift = |of: &dyn Fn(&DriftSums) -> f64| drift.as_ref().map_or(0.0, of);
     let spread = std::array::from_fn(|a| {
         std::array::from_fn(|b| {
             let ([i, j], [k, l]) = (PAIRS[a], PAIRS[b]);
             let normal = product(&blocks, [i, k], [l, j]) + product(&blocks, [i, l], [k, j]);
-            let found = normal + beyond.spread[a][b] + forms[a][b] + of_cumulants(&samples, &off, n, [i, j], [k, l]);
+            let lines = beyond.spread[a][b] + of_drift(&|drift| drift.spread[a][b]);
+            let found = normal + lines + forms[a][b] + of_cumulants(&samples, &off, n, [i, j], [k, l]);
             (if a == b { found.max(0.0) } else { found }) / (free * free)
         })
     });
     let trace = |i: usize, j: usize| blocks.iter().map(|block| block.times * block.of(i, j).trace()).sum::<f64>();
     let third = |i: usize| {
         let of_noise: f64 = blocks.iter().map(|block| block.times * cube(block.of(i, i))).sum();
-        (8.0 * of_noise + 24.0 * of_distances[i] + beyond.thirds[i]) / free.powi(3)
+        let lines = beyond.thirds[i] + of_drift(&|drift| drift.thirds[i]);
+        (8.0 * of_noise + 24.0 * of_distances[i] + lines) / free.powi(3)
     };
     Sampling {
         count: n,
-        mean_covariance: of_mean / (n * n),
-        covariance: Matrix3::from_fn(|i, j| (trace(i, j) + d[i].dot(&d[j])) / free),
+        mean_covariance: (of_mean + drift.as_ref().map_or(Matrix3::zeros(), |drift| drift.of_mean)) / (n * n),
+        covariance: Matrix3::from_fn(|i, j| {
+            (trace(i, j) + d[i].dot(&d[j]) + of_drift(&|drift| drift.trace[(i, j)])) / free
+        }),
         spread,
         variance_thirds: Some([0, 1, 2].map(third)),
     }
@@ -251,7 +284,17 @@ mod tests {
     use super::super::region::Region;
     use super::*;
     use crate::propagation::LineCovariance;
+    use crate::propagation::tap_lines::TapDrift;
     use crate::propagation::taps::{Cells, Group};
+    use crate::stages::noise::knots;
+
+    /// Covariance of two rows of a drift of variance 1, by the knot before each and the weights of it and the next.
+    fn between([(j, [a, b]), (k, [c, d])]: [(i64, [f64; 2]); 2]) -> f64 {
+        [(j, a), (j + 1, b)]
+            .iter()
+            .flat_map(|(m, x)| [(k, c), (k + 1, d)].map(|(n, y)| if *m == n { x * y } else { 0.0 }))
+            .sum()
+    }
 
     /// What row and column make of each class of an amplifier.
     fn loads(group: usize, class: usize, by: f64) -> [[f64; 2]; 2] {
@@ -260,7 +303,15 @@ mod tests {
         [[0.4 * more, 0.2 * more * x], [0.3 * more, 0.1 * more * x]]
     }
 
-    fn lines(groups: usize, by: f64, together: f64) -> TapLines {
+    const ROWS_PER_KNOT: f64 = 3.3;
+    const FIRST_ROW: i64 = -4;
+
+    fn lines(groups: usize, by: f64, together: f64, drifts: bool) -> TapLines {
+        let scale = |place: usize| (1.0 + by * (place / 3) as f64) * [0.7, 0.9, 0.5][place % 3];
+        let scales: Vec<f64> = (0..3 * groups).map(scale).collect();
+        let of_drift =
+            DMatrix::from_fn(3 * groups, 3 * groups, |a, b| if drifts { scales[a] * scales[b] } else { 0.0 });
+        let drift = drifts.then_some(TapDrift { scales, rows_per_knot: ROWS_PER_KNOT });
         let of = |axis: usize| {
             DMatrix::from_fn(3 * groups, 3 * groups, |a, b| {
                 let [one, other] = [a, b].map(|place| loads(place / 3, place % 3, by)[axis]);
@@ -268,7 +319,8 @@ mod tests {
             })
         };
         let matrix = Matrix3::from_fn(|k, l| if k == l { 0.0 } else { together });
-        TapLines { row: of(0), column: of(1), together: vec![matrix; groups], bent: [None, None] }
+        let row = of(0) + of_drift;
+        TapLines { row, drift, column: of(1), together: vec![matrix; groups], bent: [None, None] }
     }
 
     /// Photosites of an amplifier, more of each group by a share.
@@ -282,7 +334,8 @@ mod tests {
                 row: of_row(&lines.row),
                 column: of_row(&lines.column),
                 together: [0, 1, 2].map(|l| lines.together[group][(k, l)]),
-                ..Default::default()
+                drift: [0, 1, 2].map(|l| lines.drift(place, 3 * group + l)),
+                drift_rows: ROWS_PER_KNOT,
             };
             let found = Prediction::of_cumulants(20.0 + 3.0 * k as f64 + 4.0 * more, variance, 0.4 + more, 0.3);
             Prediction { lines: line, ..found }
@@ -291,8 +344,8 @@ mod tests {
     }
 
     /// Rows of two amplifiers and three columns by turns behind a filter array, or without one.
-    fn sites(by: f64, is_plane: bool) -> TappedSites {
-        let lines = lines(6, by, if is_plane { 0.0 } else { 0.1 });
+    fn sites(by: f64, is_plane: bool, drifts: bool) -> TappedSites {
+        let lines = lines(6, by, if is_plane { 0.0 } else { 0.1 }, drifts);
         let (rows, columns) = (vec![3.0, 2.0, 2.0, 4.0], vec![2.0, 1.0, 3.0, 2.0, 2.0, 1.0]);
         let class =
             |row: usize, column: usize| [[Class::Red, Class::Green], [Class::Green, Class::Blue]][row % 2][column % 2];
@@ -303,7 +356,9 @@ mod tests {
             class: is_plane.then(|| class(row, column)),
         };
         let all = (0..4).flat_map(|row| (0..6).map(move |column| cell(row, column))).collect();
-        let cells = Cells { rows, columns, all, are_by_turns: true };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few lines")]
+        let kinds_of_rows = rows.iter().enumerate().flat_map(|(kind, count)| vec![kind; *count as usize]).collect();
+        let cells = Cells { rows, columns, all, are_by_turns: true, first_row: FIRST_ROW, kinds_of_rows };
         let count = |of: usize, k: usize| -> f64 {
             let is_here = |cell: &&Cell| cell.group == of && cell.class.is_none_or(|class| class as usize == k);
             cells.all.iter().filter(is_here).map(|cell| cells.count(cell)).sum()
@@ -316,8 +371,9 @@ mod tests {
     #[test]
     #[allow(clippy::too_many_lines, reason = "one set of matrices for all sums")]
     fn cells_agree_with_full_matrices() {
-        for seen in [Seen::Planes, Seen::Class(Class::Green), Seen::Class(Class::Blue), Seen::All] {
-            let sites = sites(0.2, seen != Seen::Planes);
+        let all = [Seen::Planes, Seen::Class(Class::Green), Seen::Class(Class::Blue), Seen::All];
+        for (seen, drifts) in all.into_iter().flat_map(|seen| [(seen, false), (seen, true)]) {
+            let sites = sites(0.2, seen != Seen::Planes, drifts);
             let lines = sites.lines.as_deref().unwrap();
             let found = sampling(&sites, lines, seen);
             let samples = Samples::of(&sites, lines, seen);
@@ -340,7 +396,9 @@ mod tests {
                     let ((at, cell), (other, of_other)) = (places[a], places[b]);
                     let pair = (samples.place(cell, i), samples.place(of_other, k));
                     let own = if a == b { samples.own(cell, i, k) } else { 0.0 };
-                    own + if at[1] == other[1] { lines.row[pair] } else { 0.0 }
+                    let of_rows = [at[1], other[1]].map(|row| knots(FIRST_ROW + row as i64, ROWS_PER_KNOT));
+                    own + lines.drift(pair.0, pair.1) * between(of_rows)
+                        + if at[1] == other[1] { lines.row_alone(pair.0, pair.1) } else { 0.0 }
                         + if at[0] == other[0] { lines.column[pair] } else { 0.0 }
                 })
             };
@@ -393,9 +451,14 @@ mod tests {
     /// Amplifiers that are alike are one: planes of 11 rows and 11 columns, sums in another order, relative 10⁻¹².
     #[test]
     fn cells_that_are_alike_are_one_grid() {
-        let sites = sites(0.0, false);
+        [false, true].into_iter().for_each(check_alike);
+    }
+
+    /// Of grids that drift what is no fourth cumulant is the same; these are of what is a photosite's own, whatever it shares.
+    fn check_alike(drifts: bool) {
+        let sites = sites(0.0, false, drifts);
         let found = sampling(&sites, sites.lines.as_deref().unwrap(), Seen::Planes);
-        let grid = Grid::of_planes(Region { x: 0, y: 0, width: 11, height: 11 }, [0; 2]);
+        let grid = Grid::of_planes(Region { x: 0, y: 0, width: 11, height: 11 }, [0, -4]);
         let one = grids::sampling(&sites.groups[0].sites.map(|site| Prediction { third: 0.0, ..site }), &[grid]);
         for (a, [i, j]) in PAIRS.into_iter().enumerate() {
             assert!((found.covariance[(i, j)] - one.covariance[(i, j)]).abs() < 1e-12);

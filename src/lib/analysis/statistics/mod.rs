@@ -4,6 +4,7 @@
 //! [`check`]. [`patches`] does so for the patches of a chart.
 
 mod assessment;
+mod cell_drift;
 mod cells;
 pub mod check;
 mod deviates;
