@@ -34,6 +34,9 @@ type LineWeights = [[OfLines; 3]; 2];
 /// Lines that a pixel reaches.
 const LINES: usize = 2 * REACH.unsigned_abs() + 1;
 
+/// The last knot up to a row, and the weights of it and the next.
+type Knots = (i64, [f64; 2]);
+
 /// What planes have of each line, A and B.
 type Loads = [[[f64; 2]; LINES]; 3];
 
@@ -44,7 +47,7 @@ pub(super) struct PixelTapLines {
     taps: Vec<(Photosite, f64)>,
     terms: [LineTerms; 2],
     /// The variance of the drift, and the knots of the rows of the frame; none where there is none.
-    drift: Option<(f64, Vec<(i64, [f64; 2])>)>,
+    drift: Option<(f64, Vec<Knots>)>,
     /// By kinds of pixels, by rows and by columns.
     weights: Vec<[LineWeights; 2]>,
 }
@@ -140,7 +143,7 @@ fn loads(weights: &LineWeights, level: &TapLevels, hues: Option<[f64; 3]>) -> Lo
 }
 
 /// What planes of a pixel in a row have of each knot from the first on that its rows meet.
-fn taken_up(knots: &[(i64, [f64; 2])], row: usize, loads: &Loads) -> [[f64; LINES + 1]; 3] {
+fn taken_up(knots: &[Knots], row: usize, loads: &Loads) -> [[f64; LINES + 1]; 3] {
     let reach = REACH.unsigned_abs();
     let first = knots.get(row.saturating_sub(reach)).map_or(0, |(knot, _)| *knot);
     loads.each_ref().map(|lines| {

@@ -55,8 +55,8 @@ pub(super) const CURVED: &str = "hot pixels and random telegraph signals reach t
 /// Standard deviation, in codes, of what blurs them from which rounding of jumps is a uniform error to 3·10⁻⁶ of a squared code.
 const BLURRED: f64 = 0.8;
 
-/// Evaluations of one count, place or photosite that a class may take, a tenth of a second.
-const MOST_WORK: u64 = 8_000_000;
+/// Evaluations of one count, place or photosite that a class may take, a second.
+const MOST_WORK: u64 = 64_000_000;
 
 /// What a kind of photosites has beyond others, in units of the means.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -204,7 +204,13 @@ impl Photosite {
                 false => FEW.clone(),
             };
             let all: f64 = traps.iter().map(|(_, weight)| weight).sum();
-            for (trap, of_trap) in traps {
+            let mut foreseen = effort::Foreseen::of(traps.len());
+            for index in effort::scattered(traps.len()) {
+                foreseen.begin_next();
+                if effort::is_spent() {
+                    break;
+                }
+                let (trap, of_trap) = traps[index];
                 let weight = weight * trap_share * of_trap / all;
                 found.push(Kind { weight, is_free: false, value: of(&self.at(&State { hot, trap })) });
             }

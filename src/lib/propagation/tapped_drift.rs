@@ -115,9 +115,9 @@ impl<'a> DriftShares<'a> {
                     }
                 }
                 let (knot, weights) = mine;
-                for p in 0..2 {
-                    around[*kind].sums[place] += weights[p] * self.bands.sums[knot + p];
-                    around[*kind].of_distances[place] += weights[p] * self.of_distances[knot + p].diagonal();
+                for (knot, weight) in (knot..).zip(weights) {
+                    around[*kind].sums[place] += weight * self.bands.sums[knot];
+                    around[*kind].of_distances[place] += weight * self.of_distances[knot].diagonal();
                 }
             }
         }
