@@ -336,6 +336,7 @@ mod tests {
                 together: [0, 1, 2].map(|l| lines.together[group][(k, l)]),
                 drift: [0, 1, 2].map(|l| lines.drift(place, 3 * group + l)),
                 drift_rows: ROWS_PER_KNOT,
+                level: [0.0; 3],
             };
             let found = Prediction::of_cumulants(20.0 + 3.0 * k as f64 + 4.0 * more, variance, 0.4 + more, 0.3);
             Prediction { lines: line, ..found }
