@@ -2,8 +2,8 @@
 
 use super::curve::{BEYOND_FIVE, Curve, below_saturation};
 use super::level::Level;
+use super::site_survey::SiteSurvey;
 use super::suspects::Suspect;
-use super::tally::SiteSurvey;
 
 /// So many standard deviations are beyond chance.
 const BEYOND: f64 = 5.0;

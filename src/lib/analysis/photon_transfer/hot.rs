@@ -50,7 +50,7 @@ pub fn dark_of_tail(darks: &[Level]) -> Option<&Level> {
     let whole = darks.iter().zip(are_whole(darks)).filter(|(_, is_whole)| *is_whole).map(|(dark, _)| dark);
     let time = |dark: &Level| dark.condition.exposure_s.unwrap_or(0.0);
     let longest = whole.max_by(|a, b| time(a).total_cmp(&time(b))).filter(|dark| time(dark) > 0.0)?;
-    let is_heavy = |site: &super::tally::SiteSurvey| site.fourth > HEAVY * site.spatial.rest.value.powi(2);
+    let is_heavy = |site: &super::site_survey::SiteSurvey| site.fourth > HEAVY * site.spatial.rest.value.powi(2);
     longest.sites.iter().any(is_heavy).then_some(longest)
 }
 

@@ -1,7 +1,7 @@
 //! What a class of photosites does at one level of light, or in the dark.
 
 use super::rounding::{Hidden, Steps};
-use super::tally::SiteSurvey;
+use super::site_survey::SiteSurvey;
 
 /// Exposure times that differ by less are one.
 pub const SAME_TIME: f64 = 1e-6;

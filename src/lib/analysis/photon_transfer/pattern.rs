@@ -6,7 +6,7 @@
 use super::level::Level;
 use super::rounding::Hidden;
 use super::row_drift::{RowDrift, RowScatter, are_smooth, drift_among};
-use super::tally::SiteSurvey;
+use super::site_survey::SiteSurvey;
 use crate::numerics::variance_components::{Interval, MeanSquare, MeanSquares, combination};
 
 /// A part of a variance between photosites.

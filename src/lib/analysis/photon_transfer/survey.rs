@@ -14,9 +14,10 @@
 use super::marks::{is_marked, split_off, without_marks};
 use super::prints::{Print, Prints};
 use super::settings::Ends;
+use super::site_survey::SiteSurvey;
 use super::sites::Site;
 use super::stuck::Stuck;
-use super::tally::{SiteSurvey, Tally};
+use super::tally::Tally;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::FrameHeader;
