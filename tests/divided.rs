@@ -110,7 +110,7 @@ fn told(frame: &MemoryFrame, parts: &[Region]) -> Vec<(String, f64)> {
     tests.iter().filter_map(|test| test.deviate().map(|z| (format!("{:?}", test.subject), z))).collect()
 }
 
-/// Deviates of means and variances at every stage have rms 1 within 4 standard errors, and none is above 5. CYANOMETER_CAMERAS sets how many
+/// Deviates of means and variances at every stage have mean 0 and rms 1 within 4 standard errors, and none is above 5. CYANOMETER_CAMERAS sets how many
 /// cameras.
 fn check(most: u64, size: [usize; 2], change: impl Fn(&mut Chance, &mut ReadOut) + Sync) {
     let cameras: u64 = std::env::var("CYANOMETER_CAMERAS").map_or(most, |count| count.parse().unwrap());
@@ -138,8 +138,12 @@ fn check(most: u64, size: [usize; 2], change: impl Fn(&mut Chance, &mut ReadOut)
                 deviates.iter().fold((0, 0.0_f64), |at, (seed, z)| if z.abs() > at.1.abs() { (*seed, *z) } else { at });
             // Channels that are made of the same photosites are as good as one.
             let error = (0.5 / if stage < 3 { n } else { n / 3.0 }).sqrt();
-            eprintln!("{name}, {subject}: rms {rms:.3} of {n}, ±{error:.3}; largest {most:.2} of camera {worst}");
-            if n < 2.5 * cameras as f64 || (rms - 1.0).abs() > 4.0 * error || most.abs() > 5.0 {
+            let mean = deviates.iter().map(|(_, z)| z).sum::<f64>() / n;
+            eprintln!(
+                "{name}, {subject}: mean {mean:.3}, rms {rms:.3} of {n}, ±{error:.3}; largest {most:.2} of camera {worst}"
+            );
+            let is_off = mean.abs() > 4.0 * error * 2.0_f64.sqrt();
+            if is_off || n < 2.5 * cameras as f64 || (rms - 1.0).abs() > 4.0 * error || most.abs() > 5.0 {
                 failures.push(format!("{name}, {subject}: rms {rms}, largest {most} of camera {worst}"));
             }
         }
@@ -160,20 +164,26 @@ fn tailed(chance: &mut Chance, readout: &mut ReadOut) {
     }
 }
 
-/// Rows and columns whose noise, offsets and gains are as large as what photosites have of their own.
-fn lined(chance: &mut Chance, readout: &mut ReadOut) {
+/// Rows and columns whose noise and offsets are as large as what photosites have of their own.
+fn noisy_lines(chance: &mut Chance, readout: &mut ReadOut) {
     let mut part = |most: f64| if chance.next() < 0.4 { 0.0 } else { chance.between(0.2 * most, most) };
     (readout.row_noise_e, readout.column_noise_e) = (part(30.0), part(30.0));
     (readout.dsnu_e, readout.dsnu_row_e, readout.dsnu_column_e) = (part(20.0), part(20.0), part(20.0));
-    (readout.prnu_row, readout.prnu_column) = (part(0.006), part(0.006));
     readout.read_noise_e = readout.read_noise_e.max(1.0 / readout.adu_per_e);
 }
 
-/// The standard deviations of pixels of a layer are those that are predicted of them on the mean, to what levels scatter by: their own
-/// noise, a hundredth, moves them by less than that.
+/// Rows and columns whose gains move the level of a frame by more than all of its noise.
+fn gained_lines(chance: &mut Chance, readout: &mut ReadOut) {
+    (readout.prnu_row, readout.prnu_column) = (chance.between(0.002, 0.006), chance.between(0.002, 0.006));
+    (readout.row_noise_e, readout.dsnu_column_e) = (chance.between(0.0, 5.0), chance.between(0.0, 5.0));
+}
+
+/// The standard deviations of pixels of a layer are those that are predicted of them on the mean. Levels of pixels scatter by a tenth, their
+/// standard deviations by a twentieth.
 #[test]
 fn layers_of_sigma_are_as_predicted() {
-    let changes: [fn(&mut Chance, &mut ReadOut); 2] = [tailed, lined];
+    let changes: [fn(&mut Chance, &mut ReadOut); 2] = [tailed, noisy_lines];
+    let mut told = 0;
     for (seed, change) in (1..=4).flat_map(|seed| changes.map(|change| (seed, change))) {
         let plane = plane(&bench(seed, [60, 48], true, change).frame());
         for method in [Method::Bilinear, Method::Malvar] {
@@ -183,11 +193,13 @@ fn layers_of_sigma_are_as_predicted() {
             let channels = &report.regions[0].channels;
             for k in 0..3 {
                 let sigma = channels[3 + k].mean.unwrap().hypot(channels[3 + k].std.unwrap());
-                let predicted = channels[k].predicted_std.unwrap();
-                assert!((sigma / predicted - 1.0).abs() < 0.01, "{seed} {method:?} {k}: {sigma} {predicted}");
+                let Some(predicted) = channels[k].predicted_std else { continue };
+                told += 1;
+                assert!((sigma / predicted - 1.0).abs() < 0.04, "{seed} {method:?} {k}: {sigma} {predicted}");
             }
         }
     }
+    assert!(told >= 36, "{told}");
 }
 
 /// What is not predicted is refused by name.
@@ -208,18 +220,26 @@ fn what_is_beyond_is_named() {
     let unrecorded = why([20, 16], &rows, &before);
     assert!(unrecorded.contains("correct the frame anew"), "{unrecorded}");
     let drift = |readout: &mut ReadOut| (readout.black_drift_e, readout.black_drift_rows) = (3.0, 20.0);
-    assert!(why([20, 16], &drift, &as_it_is).contains("how far that moves its level"));
-    let gains = |readout: &mut ReadOut| readout.prnu_column = 0.03;
-    assert!(why([20, 160], &gains, &as_it_is).contains("differ so much in response"));
+    let by_drift = why([20, 16], &drift, &as_it_is);
+    assert!(by_drift.contains("how far that moves its level"), "{by_drift}");
+    let gains = |readout: &mut ReadOut| readout.prnu_column = 0.05;
+    let by_gains = why([20, 200], &gains, &as_it_is);
+    assert!(by_gains.contains("differ so much in response"), "{by_gains}");
     let hot = |readout: &mut ReadOut| {
         (readout.hot_pixel_share, readout.hot_pixel_dark_current_e_per_s) = (0.01, 1e5);
     };
-    assert!(why([20, 16], &hot, &as_it_is).contains("fill up or go beyond the codes"));
+    let by_wells = why([20, 16], &hot, &as_it_is);
+    assert!(by_wells.contains("fill up or go beyond the codes"), "{by_wells}");
 }
 
 #[test]
-fn rows_and_columns_are_predicted() {
-    check(10, [120, 100], lined);
+fn noise_of_rows_and_columns_is_predicted() {
+    check(8, [120, 100], noisy_lines);
+}
+
+#[test]
+fn gains_of_rows_and_columns_are_predicted() {
+    check(8, [120, 100], gained_lines);
 }
 
 /// Smear of up to a tenth of the light.

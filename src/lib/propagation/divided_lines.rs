@@ -157,3 +157,96 @@ fn left_e(model: &NoiseModel, darks: &[Option<Dark>; MOST_DARKS], level_e: f64) 
     let dark_e = |model: &NoiseModel| model.dark_e * sensitivity(model.dcnu).0 + model.tails.mean_hot_e();
     dark_e(model) - darks.iter().flatten().map(|dark| dark.weight * dark_e(&dark.model)).sum::<f64>() - level_e
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metadata::{AdcRecord, PoissonKind};
+    use crate::propagation::masters::{Flat, LevelLines};
+    use crate::propagation::moments::Equations;
+    use crate::stages::noise::{LineNoise, Tails};
+
+    const LINES: LineNoise = LineNoise {
+        row_noise_e: 7.0,
+        column_noise_e: 3.0,
+        black_drift_e: 0.0,
+        black_drift_rows: 0.0,
+        dsnu_e: 2.0,
+        dsnu_row_e: 5.0,
+        dsnu_column_e: 4.0,
+        prnu_row: 0.0,
+        prnu_column: 0.0,
+    };
+
+    /// Three planes of 80 rows and 60 columns, of 2000, 6000 and 15 000 e⁻ over 9000; the dark signal of bias frames, which is none, came off
+    /// all.
+    fn divided(lines: LineNoise) -> Photosite {
+        let model = NoiseModel {
+            dark_e: 0.0,
+            dcnu: 0.0,
+            prnu: 0.01,
+            read_noise_e: 8.0,
+            full_well_e: 60_000.0,
+            dark_shot: true,
+            signal_shot: true,
+            poisson: PoissonKind::Exact,
+            lines,
+            tails: Tails::default(),
+        };
+        let bias = Dark { is_bias: true, ..Dark::mean_of(model, 5) };
+        let flat = Flat {
+            expected_e: [9000.0; 3],
+            photosites: [1e15; 3],
+            counted_share: [1.0; 3],
+            frames: Dark::mean_of(model, 2),
+            levels: None,
+            darks: [Some(bias), None, None],
+            shares_masters: false,
+            level_lines: Some(LevelLines { lines: [80.0, 60.0], is_array: false }),
+            levels_adu: [0.0; 2],
+        };
+        let site = Photosite::of_electrons(model, Equations::Exact).digitized(AdcRecord::new(14, 600.0, 0.25));
+        Photosite { darks: [Some(bias), None, None], flat: Some(flat), ..site }
+    }
+
+    const LIGHT: [f64; 3] = [2000.0, 6000.0, 15_000.0];
+
+    /// The noise of the flat field is as good as none in the mean of a whole frame, and its offsets are; what lines add to the frame and to
+    /// what came off stays: K² r² (1 + 1/5), of a row over 80 and of a column over 60, between all classes.
+    #[test]
+    fn noise_of_flats_cancels_in_whole_frames() {
+        let site = divided(LINES);
+        let [row, column] = Axis::ALL.map(|axis| site.shared_by_quotients(axis, LIGHT).unwrap());
+        let level = site.level_covariance(LIGHT);
+        let square = 0.25 * 0.25;
+        let expected = square * 1.2 * (49.0 / 80.0 + 9.0 / 60.0);
+        for k in 0..3 {
+            for l in 0..3 {
+                let found = square * (row[(k, l)] / 80.0 + column[(k, l)] / 60.0) + level[k][l];
+                assert!((found / expected - 1.0).abs() < 1e-9, "{k} {l}: {found} {expected}");
+            }
+        }
+    }
+
+    /// Gains come off each photosite, and move the level as they would that of a frame that was not divided: by s of it in each line.
+    #[test]
+    fn gains_move_the_level() {
+        let gains = LineNoise { prnu_row: 0.004, prnu_column: 0.003, ..LineNoise::default() };
+        let site = divided(gains);
+        assert!(Axis::ALL.iter().all(|axis| site.shared_by_quotients(*axis, LIGHT).unwrap().abs().max() < 1e-12));
+        let level = site.level_covariance(LIGHT);
+        let of_lines = 0.004_f64.powi(2) / 80.0 + 0.003_f64.powi(2) / 60.0;
+        for (k, l) in (0..9).map(|pair| (pair / 3, pair % 3)) {
+            let expected = 0.25 * LIGHT[k] * 0.25 * LIGHT[l] * of_lines;
+            assert!((level[k][l] / expected - 1.0).abs() < 1e-9, "{k} {l}: {} {expected}", level[k][l]);
+        }
+    }
+
+    /// Red and blue photosites share no row and no column; green ones are in every one.
+    #[test]
+    fn classes_of_an_array_share_lines() {
+        let lines = LevelLines { lines: [40.0, 30.0], is_array: true };
+        // Of 40 rows of cells red has 40 rows, green 80.
+        assert_eq!([[0, 0], [1, 1], [0, 1], [0, 2]].map(|pair| lines.shared(0, pair) * 80.0), [2.0, 1.0, 1.0, 0.0]);
+    }
+}
