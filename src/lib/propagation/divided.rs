@@ -3,10 +3,10 @@
 use super::charge::{charge, sensitivities};
 use super::divided_kinds::CUT_OFF;
 use super::masters::{Dark, Drawn, Flat};
+use super::mixture::mixture;
 use super::moments::{LineCovariance, Prediction};
 use super::photosite::Photosite;
 use super::quotients::{Quotients, few_sensitivities};
-use super::tails::mixture;
 use super::unlike::{Temporal, Unlike, UnlikeSums};
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::metadata::AdcRecord;

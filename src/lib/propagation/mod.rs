@@ -40,6 +40,7 @@ mod lookup;
 pub mod masters;
 mod memory;
 mod mixed_pixel;
+mod mixture;
 pub mod moments;
 mod node;
 mod offsets;
