@@ -222,7 +222,7 @@ fn what_is_beyond_is_named() {
     let drift = |readout: &mut ReadOut| (readout.black_drift_e, readout.black_drift_rows) = (3.0, 20.0);
     let by_drift = why([20, 16], &drift, &as_it_is);
     assert!(by_drift.contains("how far that moves its level"), "{by_drift}");
-    let gains = |readout: &mut ReadOut| readout.prnu_column = 0.05;
+    let gains = |readout: &mut ReadOut| (readout.prnu_column, readout.read_noise_e) = (0.05, 200.0);
     let by_gains = why([20, 200], &gains, &as_it_is);
     assert!(by_gains.contains("differ so much in response"), "{by_gains}");
     let hot = |readout: &mut ReadOut| {
