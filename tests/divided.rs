@@ -175,7 +175,10 @@ fn noisy_lines(chance: &mut Chance, readout: &mut ReadOut) {
 /// Rows and columns whose gains move the level of a frame by more than all of its noise.
 fn gained_lines(chance: &mut Chance, readout: &mut ReadOut) {
     (readout.prnu_row, readout.prnu_column) = (chance.between(0.002, 0.006), chance.between(0.002, 0.006));
-    (readout.row_noise_e, readout.dsnu_column_e) = (chance.between(0.0, 5.0), chance.between(0.0, 5.0));
+    // Of half of the cameras nothing is left in rows and columns.
+    if chance.next() < 0.5 {
+        (readout.row_noise_e, readout.dsnu_column_e) = (chance.between(0.0, 5.0), chance.between(0.0, 5.0));
+    }
 }
 
 /// The standard deviations of pixels of a layer are those that are predicted of them on the mean. Levels of pixels scatter by a tenth, their
@@ -222,7 +225,7 @@ fn what_is_beyond_is_named() {
     let drift = |readout: &mut ReadOut| (readout.black_drift_e, readout.black_drift_rows) = (3.0, 20.0);
     let by_drift = why([20, 16], &drift, &as_it_is);
     assert!(by_drift.contains("how far that moves its level"), "{by_drift}");
-    let gains = |readout: &mut ReadOut| readout.prnu_column = 0.05;
+    let gains = |readout: &mut ReadOut| (readout.prnu_column, readout.read_noise_e) = (0.05, 200.0);
     let by_gains = why([20, 200], &gains, &as_it_is);
     assert!(by_gains.contains("differ so much in response"), "{by_gains}");
     let hot = |readout: &mut ReadOut| {

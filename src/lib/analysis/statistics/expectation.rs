@@ -7,10 +7,11 @@ use super::groups::{self, Part};
 use super::region::Region;
 use crate::cfa::Class;
 use crate::numerics::normal::MeanVariance;
+use crate::propagation::moments::common;
 use crate::propagation::sampling::Sampling;
 use crate::propagation::taps::{Group, TappedSites, pooled};
 use crate::propagation::{LineCovariance, PixelMoments, Prediction, SiteCovariance, TappedPixels};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// What is predicted of channels that are observed together; nothing by default.
 #[derive(Debug, Clone, Default)]
@@ -174,13 +175,13 @@ impl Predicted {
         let grids = array.filter(|_| !SiteCovariance::of(&channels).is_independent()).map(|array| array.grids(class));
         let sampling = match &grids {
             Some(grids) => grids::sampling(&channels, grids),
-            None => Sampling::independent(&[*prediction; 3], count as f64),
+            None => Sampling::independent(&channels, count as f64),
         };
         let one = match &grids {
             Some(_) if count > 0 => {
                 Self::of_one_that_is(Expectation::of_sampling(prediction, &sampling), prediction, count)
             }
-            _ => Self::of_one(prediction, count),
+            _ => Self::of_one(&channels[0], count),
         };
         let expected = Expected {
             mean: [prediction.moments.mean; 3],
@@ -271,7 +272,8 @@ impl Expectation {
         Self {
             mean: prediction.moments.mean,
             std,
-            mean_error: (std * std / n + prediction.common).sqrt(),
+            // Of a class alone all channels are alike.
+            mean_error: (std * std / n + prediction.common + prediction.lines.level[0]).sqrt(),
             sample_std: std,
             std_error,
         }
@@ -305,7 +307,8 @@ fn mixed(classes: &[Prediction; 3], counts: [u64; 3]) -> Option<Prediction> {
         })
         .sum();
     let excess_kurtosis = if variance > 0.0 { fourth / variance.powi(2) - 3.0 } else { 0.0 };
-    let common = shares.iter().zip(classes).map(|(w, p)| w * w * p.common).sum();
+    let of_classes = Vector3::from(shares);
+    let common = of_classes.dot(&(common(classes) * of_classes));
     Some(Prediction {
         moments: MeanVariance { mean, variance },
         third: 0.0,
