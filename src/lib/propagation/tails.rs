@@ -56,8 +56,8 @@ pub(super) const CURVED: &str = "hot pixels and random telegraph signals reach t
 /// Standard deviation, in codes, of what blurs them from which rounding of jumps is a uniform error to 3·10⁻⁶ of a squared code.
 const BLURRED: f64 = 0.8;
 
-/// Evaluations of one count, place or photosite that a class may take, a second.
-const MOST_WORK: u64 = 64_000_000;
+/// Evaluations of one count, place or photosite that a class may take, a fifth of a second.
+const MOST_WORK: u64 = 16_000_000;
 
 /// What a kind of photosites has beyond others, in units of the means.
 #[derive(Debug, Clone, Copy, PartialEq)]
