@@ -1,5 +1,7 @@
 //! Photon transfer of frames that were corrected: the same numbers where they are the same, and none that came off.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up shall stop there")]
+
 use crate::support::workshop::{BAD_DATA, Workshop};
 use serde_json::Value;
 

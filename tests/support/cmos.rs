@@ -108,7 +108,17 @@ pub fn drifting(size: [usize; 2], electrons: [f32; 3], rows: f64) -> MemoryFrame
 
 /// False alarms of the regions of frames come no more often than the level says.
 pub fn regions_cover(what: &str, parts: &[Region], made: impl Fn(u64) -> Vec<MemoryFrame> + Sync + Send) {
-    for (index, corrected) in over_seeds(SEEDS, parts, made).iter().enumerate() {
+    regions_cover_over(SEEDS, what, parts, made);
+}
+
+/// The same over fewer seeds, as of frames less dark frames of their own, each of which is predicted by itself.
+pub fn regions_cover_over(
+    seeds: u64,
+    what: &str,
+    parts: &[Region],
+    made: impl Fn(u64) -> Vec<MemoryFrame> + Sync + Send,
+) {
+    for (index, corrected) in over_seeds(seeds, parts, made).iter().enumerate() {
         judge(&format!("{what}, {index}"), corrected, 0.0);
     }
 }

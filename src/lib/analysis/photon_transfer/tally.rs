@@ -309,6 +309,17 @@ impl Tally {
         }
     }
 
+    /// Of the mean of the frames, whose mean over photosites is so far above the center.
+    fn spatial_sums(&self, above: f64) -> SquareSums {
+        let [columns, rows] = self.size.map(|extent| extent as f64);
+        let about = |sums: &[f64], each: f64| sums.iter().map(|sum| (sum / each - above).powi(2)).sum::<f64>() * each;
+        SquareSums {
+            all: self.squares - rows * columns * above * above,
+            rows: about(&self.row_means, columns),
+            columns: about(&self.column_means, rows),
+        }
+    }
+
     /// What the rows tell.
     pub fn finish(mut self) -> SiteSurvey {
         let copies = self.copies();
@@ -318,13 +329,8 @@ impl Tally {
         let (frames, times) = (self.frames as f64, self.times());
         let above: f64 = self.row_means.iter().sum::<f64>() / n;
         let mean = self.center + above;
-        let spatial_sum = self.squares - n * above * above;
-        let about = |sums: &[f64], each: f64| sums.iter().map(|sum| (sum / each - above).powi(2)).sum::<f64>() * each;
-        let spatial = SquareSums {
-            all: spatial_sum,
-            rows: about(&self.row_means, columns),
-            columns: about(&self.column_means, rows),
-        };
+        let spatial = self.spatial_sums(above);
+        let spatial_sum = spatial.all;
         let drifts: Vec<f64> = self.frame_sums.iter().map(|sum| sum / n).collect();
         let is_uneven = spatial_sum > f64::EPSILON * n * mean * mean;
         let slope =

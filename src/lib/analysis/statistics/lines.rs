@@ -16,7 +16,7 @@ use crate::cfa::{CfaPattern, Class};
 use crate::frame::Window;
 use crate::metadata::FrameHeader;
 use crate::numerics::significance;
-use crate::propagation::{Prediction, SiteCovariance};
+use crate::propagation::{FramePrediction, SiteCovariance};
 use std::ops::Range;
 
 /// Rows or columns of a grid.
@@ -83,8 +83,9 @@ impl LineSums {
         }
     }
 
-    /// Tests of rows and columns of the classes, or planes, of a frame.
-    pub fn tests(&self, frame: &FrameHeader, predictions: &[Prediction; 3]) -> Vec<Test> {
+    /// Tests of rows and columns of the classes, or planes, of a frame; none of photosites that are told by their places.
+    pub fn tests(&self, frame: &FrameHeader, prediction: Option<&FramePrediction>) -> Vec<Test> {
+        let Some(FramePrediction::Planes(predictions)) = prediction else { return Vec::new() };
         let name = |k: usize| if self.pattern.is_some() { Class::ALL[k].letter() } else { frame.channel_name(k) };
         let sites = SiteCovariance::of(predictions);
         let of_class = |k: usize| {

@@ -130,10 +130,8 @@ fn measure_all(
         // What is left where pixels are left out by their values follows no formula; those of defects are any.
         let prediction = prediction.as_ref().ok().filter(|_| is_fair(marks));
         let assessment = Assessment::new(tally, &frame, *region, prediction, sampling);
-        let mut tests = if level.is_some() { assessment.tests() } else { Vec::new() };
-        if let (Some(lines), Some(FramePrediction::Planes(classes))) = (&tally.lines, prediction) {
-            tests.extend(lines.tests(&frame, classes));
-        }
+        let of_lines = tally.lines.iter().flat_map(|lines| lines.tests(&frame, prediction));
+        let tests = if level.is_some() { assessment.tests().into_iter().chain(of_lines).collect() } else { Vec::new() };
         assessment.report(&frame, *region, &levels).with_marks(*marks, left_out).tested(tests)
     };
     let regions = regions.iter().zip(&tallies).zip(&counts).enumerate().map(report).collect();

@@ -90,17 +90,10 @@ impl PhotonTransfer {
         self.check()?;
         let list_name = self.list.display().to_string();
         let is_folder = self.list.is_dir();
-        let FrameList { frames, white_level_adu } = if is_folder {
-            FrameList { frames: in_folder(&self.list)?, white_level_adu: None }
-        } else {
-            frame_list::read(&self.list)?
-        };
+        let FrameList { frames, white_level_adu } = self.frames()?;
         let read = self.reading(white_level_adu);
         let heads = frames.par_iter().map(|frame| read.head_of(frame)).collect::<Result<Vec<_>>>()?;
-        let Some(first) = heads.first() else {
-            return Err(Error::format(&list_name, "it holds no frames"));
-        };
-        let first = &first.header;
+        let first = &heads.first().ok_or_else(|| Error::format(&list_name, "it holds no frames"))?.header;
         for head in &heads {
             check_same(first, &head.header)?;
             check_alike(first, &head.header)?;
@@ -157,6 +150,14 @@ impl PhotonTransfer {
             corrected: corrected.and_then(|corrected| in_words(first, corrected)),
             notes,
         })
+    }
+
+    /// The frames of the list, or of the directory.
+    fn frames(&self) -> Result<FrameList> {
+        if self.list.is_dir() {
+            return Ok(FrameList { frames: in_folder(&self.list)?, white_level_adu: None });
+        }
+        frame_list::read(&self.list)
     }
 
     /// How each file is read; a list may tell the largest code.
