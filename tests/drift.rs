@@ -4,7 +4,7 @@
 
 use crate::support::chain::{colored, demosaicked, digitized, less_darks, noisy, plane_of, settings, with_readout};
 use crate::support::cmos::{
-    before_demosaicking, drifting, regions, regions_cover, regions_cover_over, regions_or, scene, several_taps,
+    SEEDS, before_demosaicking, drifting, regions, regions_cover, regions_cover_over, regions_or, scene, several_taps,
     sigma_covers, tapped, tapped_with_lines,
 };
 use crate::support::misses::trials;
