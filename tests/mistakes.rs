@@ -73,7 +73,7 @@ const MISTAKES: [(&str, i32, &str); 139] = [
     (
         "predict-noise --electrons 900,2000,4000 --patch 4x9000",
         BAD_USAGE,
-        "a patch of 4x9000 pixels is larger than the sensor, which has 2614x1966 photosites; give another --patch",
+        "a patch of 4x9000 pixels is larger than the sensor, which has 2654x1996 photosites; give another --patch",
     ),
     (
         "predict-noise --dark -o noise.png",
