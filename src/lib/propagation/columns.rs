@@ -23,7 +23,7 @@ pub(super) const BLOOMED: &str = "photosites are saturated by neighbors: charge 
 const ALIKE: f64 = 2e-3;
 
 /// Why nothing is predicted where photosites of a class differ by their columns.
-const UNEVEN: &str = "the smear of columns with red photosites and of those with blue ones differs by more than the four hundredth \
+const UNEVEN: &str = "the smear of columns with red photosites and of those with blue ones differs by more than the 250th \
                       part of the noise, so that photosites of a class are not alike";
 
 /// Why nothing is predicted of another array's mosaic.

@@ -103,6 +103,10 @@ const UNLIKE_FLATS: &str = "the median or clipped mean of flats counts whose lig
 const CLIPPED_BY_CODE: &str = "the noise of the dark or bias frames, over few codes, makes what their clipped mean leaves out hang \
                                on where in a code their mean lies; use `--combine mean` or `median`";
 
+/// Why nothing is predicted where those that stand out were taken away.
+const FOUND: &str = "hot pixels or random telegraph signals that stand out were found and left out (`--find-defects`), and of the others nothing is \
+                     told; list defects from elsewhere (`--defects`)";
+
 /// Photosites whose codes are as the converter gave them, or as they were corrected.
 fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Predicted<Photosite> {
     let metadata = &frame.metadata;
@@ -124,6 +128,9 @@ fn codes_of(frame: &FrameHeader, codes: Photosite, expected_e: [f64; 3]) -> Pred
     }
     let corrected = corrected(frame, codes)?;
     corrected.check_tails(expected_e)?;
+    if corrected.has_tails() && correction.defects.as_ref().is_some_and(|defects| defects.found_beyond.is_some()) {
+        return Err(Unpredictable::Beyond(FOUND));
+    }
     subtracted(correction.black_adu, correction.black_deltas)?;
     Ok(corrected)
 }

@@ -124,13 +124,17 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
     });
     let dark_noise = needed("dark_noise_e")?;
     let [black_drift_e, black_drift_rows] = drift_of(camera, &mut told);
-    let of_lines = row_noise_e.powi(2) + column_noise_e.powi(2) + black_drift_e.powi(2);
-    let read_noise_e = (dark_noise.value.powi(2) - of_lines).max(0.0).sqrt();
-    told.tell(
-        "read_noise_e",
-        Origin::Derived,
-        format!("dark noise {}, less that of rows and columns", shown(dark_noise)),
-    );
+    // Frames are off by a drift as a whole besides, which is in no variance within them.
+    let of_pixels = pooled("pixel_noise_e").filter(|_| black_drift_e > 0.0);
+    let of_lines = row_noise_e.hypot(column_noise_e);
+    let (read_noise_e, why) = match of_pixels {
+        Some(noise) => (noise.value, format!("temporal noise of photosites, {}", shown(noise))),
+        None => (
+            (dark_noise.value.powi(2) - of_lines * of_lines).max(0.0).sqrt(),
+            format!("dark noise {}, less that of rows and columns", shown(dark_noise)),
+        ),
+    };
+    told.tell("read_noise_e", Origin::Derived, why);
     match camera.temperature_k {
         Some(_) => told.tell("temperature_k", Origin::Measured, "said with the frames"),
         None => told.tell("temperature_k", Origin::Assumed, "a room's: no frame says it"),

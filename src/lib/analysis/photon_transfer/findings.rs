@@ -7,7 +7,7 @@ use super::level::{Level, is_same_time};
 use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, drift_of, fixed, of_light, temporal, with_hidden};
-use super::reasons::{LOST_DARK, NO_NOISE, Reasons, of_gain, time_of_noise};
+use super::reasons::{DRIFT_OF_FEW_ROWS, LOST_DARK, NO_NOISE, Reasons, of_gain, time_of_noise};
 use super::rounding::{Steps, least_normal};
 use super::row_drift::RowDrift;
 use super::scatter::Scatter;
@@ -85,15 +85,17 @@ pub fn of_class(
         if root.high > 0.0 { Ok(over(root, gain.clone()?)) } else { Err(NO_NOISE.into()) }
     };
     let quietest = repeated.iter().min_by(|a, b| a.variance.total_cmp(&b.variance));
+    let drift = drift_of(&repeated).zip(gain.as_ref().ok()).map(|(drift, gain)| drift.in_electrons(gain.value));
     for (key, part) in [("row_noise_e", Part::Row), ("column_noise_e", Part::Column), ("pixel_noise_e", Part::Pixel)] {
         let of_part = |quietest: &&Level| match part {
             Part::Pixel => pixel_noise(&repeated, rounding, confidence).map(|variance| variance - rounding),
             _ => with_hidden(temporal(&repeated, part, confidence), part, quietest, rounding),
         };
         let told = quietest.filter(|_| curve.tells_dark_noise()).map(of_part);
-        add(key, over_gain(told.ok_or_else(|| reasons.of_noise())));
+        let is_hidden = part == Part::Row && drift.is_some_and(|drift| drift.hides_rows());
+        let told = if is_hidden { Err(DRIFT_OF_FEW_ROWS.into()) } else { told.ok_or_else(|| reasons.of_noise()) };
+        add(key, over_gain(told));
     }
-    let drift = drift_of(&repeated).zip(gain.as_ref().ok()).map(|(drift, gain)| drift.in_electrons(gain.value));
     // The signal that equals its noise: ½ + √(¼ + σ²) [EMVA1288, Eq. 25].
     let noise_square = |v: &Values| Some(v.dark_variance? / (v.gain * v.gain));
     let threshold = |square: f64| 0.5 + (0.25 + square.max(0.0)).sqrt();

@@ -55,9 +55,18 @@ fn terms(
 
 /// Terms of the fixed pattern of a level.
 fn fixed_terms(level: &Level, part: Part, factor: f64) -> Vec<(f64, MeanSquare)> {
-    let mut found = terms(level, part, |index| (level.sites[index].spatial, size(level, index)), factor);
-    let off = -factor / level.frames as f64;
-    found.extend(terms(level, part, |index| (level.sites[index].temporal, size(level, index)), off));
+    let drift = drift_of(&[level]);
+    // A drift that is left in rows makes them alike, and fewer.
+    let fewer = |squares: MeanSquares, index: usize, left: f64| {
+        let kept =
+            drift.map_or(1.0, |drift| drift.kept_freedom(squares.rows.value / size(level, index)[0] as f64, left));
+        MeanSquares { rows: MeanSquare { freedom: squares.rows.freedom * kept, ..squares.rows }, ..squares }
+    };
+    let frames = level.frames as f64;
+    let spatial = |index: usize| (fewer(level.sites[index].spatial, index, 1.0 / frames), size(level, index));
+    let temporal = |index: usize| (fewer(level.sites[index].temporal, index, 1.0), size(level, index));
+    let mut found = terms(level, part, spatial, factor);
+    found.extend(terms(level, part, temporal, -factor / frames));
     found
 }
 

@@ -15,6 +15,9 @@ const UNSATURATED: &str = "the variance still rises at the brightest flat: brigh
 /// Of what frames without any noise do not tell.
 pub const NO_NOISE: &str = "the frames show none at all, not even noise: it takes frames as a camera gives them";
 
+/// Of rows whose neighbors have hardly more of a drift in common than noise of their own.
+pub const DRIFT_OF_FEW_ROWS: &str = "the black level drifts within so few rows that noise of rows is not told from it";
+
 /// Of frames that were corrected by darks, or by black beside the image.
 pub const LOST_DARK: &str =
     "what dark charge adds on average came off the frames: it takes darks as the camera gives them";

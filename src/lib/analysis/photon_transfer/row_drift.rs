@@ -84,6 +84,21 @@ pub struct RowDrift {
 }
 
 impl RowDrift {
+    /// Whether knots are so near to each other that second differences of rows have much of it.
+    pub fn hides_rows(&self) -> bool {
+        const NEAR: f64 = 5.0;
+        self.rows_per_knot < NEAR
+    }
+
+    /// The share that is left of the degrees of freedom of rows of such a variance, `left` of the drift's in it: 1/(1 + 2 Σ ρ²).
+    pub fn kept_freedom(&self, variance: f64, left: f64) -> f64 {
+        let share = (left * self.variance / variance).min(1.0);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some rows")]
+        let farthest = (2.0 * self.rows_per_knot).ceil() as usize;
+        let sum: f64 = (1..farthest).map(|rows| covariance(rows as f64 / self.rows_per_knot).powi(2)).sum();
+        1.0 / (1.0 + 2.0 * share * share * sum)
+    }
+
     /// The same in e-², of such a gain.
     #[must_use]
     pub fn in_electrons(self, adu_per_e: f64) -> Self {

@@ -96,10 +96,37 @@ pub fn check_same(first: &FrameHeader, other: &FrameHeader) -> Result<()> {
     Err(other.refuse(problem + "; flats and darks are measured that were corrected alike"))
 }
 
+/// Makes sure that frames of one exposure time are less the same darks.
+///
+/// # Errors
+///
+/// [`crate::error::Error::Order`] where they differ.
+pub fn check_masters<'a>(frames: impl Iterator<Item = (&'a FrameHeader, Option<f64>)>) -> Result<()> {
+    let mut known: Vec<(&FrameHeader, Option<f64>)> = Vec::new();
+    let masters = |head: &'a FrameHeader| head.metadata.correction.as_ref().map(|record| &record.masters);
+    for (head, exposure_s) in frames {
+        match known.iter().find(|(_, of)| *of == exposure_s) {
+            None => known.push((head, exposure_s)),
+            Some((first, _)) if masters(first) == masters(head) => {}
+            Some((first, _)) => {
+                return Err(head.refuse(format!(
+                    "other dark frames came off it than off {}, of the same exposure time; flats and darks of one time are measured that are \
+                     less the same",
+                    first.name
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// What is said of numbers of frames that were corrected.
 pub fn in_words(head: &FrameHeader, Corrected { is_marked, lost_dark }: Corrected) -> Option<String> {
     let steps = Steps::of(head.metadata.correction.as_ref()?).in_words();
     let mut text = format!("the frames were corrected by {steps}: patterns are those which that left");
+    if head.metadata.correction.as_ref().is_some_and(|record| record.black_deltas) {
+        text += ", and so is noise of rows or columns";
+    }
     if lost_dark {
         text += ", and what dark charge adds on average is off";
     }

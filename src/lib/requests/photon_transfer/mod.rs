@@ -23,7 +23,7 @@ use checks::{
 };
 use clap::Args;
 use conditions::{Group, Reading, grouped, in_folder};
-use corrections::{check_same, corrected, in_words};
+use corrections::{check_masters, check_same, corrected, in_words};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use surveys::Surveys;
@@ -98,6 +98,7 @@ impl PhotonTransfer {
             check_same(first, &head.header)?;
             check_alike(first, &head.header)?;
         }
+        check_masters(heads.iter().map(|head| (&head.header, head.exposure_s)))?;
         let corrected = corrected(first, heads.iter().any(|head| head.has_marks));
         let descriptor = is_folder.then(|| frame_list::descriptor_in(&self.list)).flatten();
         let grouped = grouped(&list_name, &frames, &heads);

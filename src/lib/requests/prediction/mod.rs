@@ -298,6 +298,7 @@ impl NoisePrediction {
         let mut notes: Vec<Note> =
             warnings.into_iter().map(Note::Warning).chain(doubts).chain(base.doubts().map(Note::Warning)).collect();
         notes.extend(doubts::of_converter(loaded.sensor.readout()?));
+        doubts::check_place(loaded.sensor.readout()?, self.patch, self.patch_at)?;
         let color = self.color(&loaded.sensor, &mut notes)?;
         let one = |sample: usize| -> Result<SamplePrediction> {
             let per_exposure = per_exposure(&signals, sample, &loaded.sensor)?;
