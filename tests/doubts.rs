@@ -502,3 +502,36 @@ fn pictures_of_ours_tell_their_white() {
     let attribute = [b"whiteLuminance\0float\0\x04\0\0\0", &4000.0_f32.to_le_bytes()[..]].concat();
     assert!(shop.bytes("lin.exr").windows(attribute.len()).any(|window| window == attribute));
 }
+
+/// Behind defects of a sensor with hot pixels it is said that these count: a hundredth of 800 e⁻ adds 8 e⁻² of shot noise to
+/// 6.8² of reading, 0.165 of dark current and 1/12 of (1/0.12)² of rounding, a root of 1.153, and dark frames add to all alike.
+#[test]
+fn hot_pixels_beside_defects_are_told() {
+    let shop = Workshop::new();
+    let template = String::from_utf8(shop.run("cyanometer template sensor", &[])).unwrap();
+    let hot = "readout:\n  hot_pixel_share: 0.01\n  hot_pixel_dark_current_e_per_s: 24242\n";
+    fs::write(shop.path("plain.yaml"), &template).unwrap();
+    fs::write(shop.path("hot.yaml"), template.replacen("readout:\n", hot, 1)).unwrap();
+    fs::write(shop.path("list.txt"), "5,7\n").unwrap();
+    let left = "were found and left out, but the standard deviations count them: they are up to 7.4 % too large";
+    let listed = "if its list of defects names such, standard deviations are up to 7.4 % too large";
+    for sensor in ["hot", "plain"] {
+        let is_hot = sensor == "hot";
+        for (name, electrons, frame) in [("codes", 400, 0), ("d1", 0, 1), ("d2", 0, 2), ("d3", 0, 3)] {
+            let scene = format!("--electrons {electrons},{electrons},{electrons} --size 64x48 --sensor {sensor}.yaml");
+            shop.pipe(&format!(
+                "render-radiance {scene} | add-noise --frame {frame} | mosaic | digitize -o {name}.exr"
+            ));
+        }
+        let darks = "correct-frame codes.exr --dark d1.exr --dark d2.exr --dark d3.exr";
+        shop.said(&format!("{darks} --find-defects -o found.exr"), 0);
+        assert_eq!(shop.said("demosaic found.exr --sigma -o rgb.exr", 0).contains(left), is_hot);
+        assert!(!shop.said("demosaic found.exr -o rgb.exr", 0).contains("too large"));
+        assert!(!shop.said("measure found.exr", 0).contains("too large"));
+        assert_eq!(shop.said(&format!("{darks} --defects list.txt -o listed.exr"), 0).contains(listed), is_hot);
+        assert_eq!(shop.said("measure listed.exr", 0).contains(listed), is_hot);
+        assert_eq!(shop.said("demosaic listed.exr --sigma -o rgb.exr", 0).contains(listed), is_hot);
+        shop.said(&format!("{darks} -o dark.exr"), 0);
+        assert!(!shop.said("demosaic dark.exr --sigma -o rgb.exr", 0).contains("too large"));
+    }
+}

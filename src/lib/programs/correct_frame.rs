@@ -50,6 +50,7 @@ fn correct(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     session.sign(header);
     propagation::note(header, Equations::Exact);
     session.tell(requests::of_levels(correction.header()).as_slice());
+    session.tell(requests::of_listed_defects(correction.header()).as_slice());
     session.tell(&correction.notes);
     if session.correct(reader, &mut correction, output)? {
         session.tell(&correction.findings());

@@ -75,5 +75,8 @@ fn measure(arguments: &Arguments, turn: &cli::Turn<'_>, findings: &Findings) -> 
         plots::write_plot(path, &report::portrait(portrait, &report.regions[0]))?;
     }
     session.tell(&requests::of_statistics(&report));
+    if report.unpredicted.is_none() {
+        session.tell(requests::of_listed_defects(reader.header()).as_slice());
+    }
     findings.add(reader.header(), output.index, report)
 }

@@ -71,6 +71,7 @@ fn convert(
         let stage = WithSigma::of_conversion(stage, reader.header())?;
         session.tell(requests::of_undrawn(reader.header()).as_slice());
         session.tell(requests::of_coarse_codes(reader.header()).as_slice());
+        session.tell(requests::of_sigma_beside_defects(reader.header()).as_slice());
         session.drive(reader, &stage, output)
     } else {
         session.drive(reader, &stage, output)

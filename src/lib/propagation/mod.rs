@@ -30,6 +30,7 @@ pub mod frame;
 pub mod gains;
 pub(crate) mod ground;
 mod law;
+mod left_out;
 mod level_variance;
 mod line_means;
 mod line_sampling;
@@ -87,6 +88,7 @@ mod unpredictable;
 
 pub use exposures::Repeated;
 pub use frame::{FramePrediction, Unpredictable, of_frame, of_samples};
+pub use left_out::{LeftOutTails, left_out_tails};
 pub use moments::{Equations, LineCovariance, Prediction, SiteCovariance};
 pub use photosite::Photosite;
 pub use pixel_moments::PixelMoments;

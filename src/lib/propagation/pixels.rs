@@ -326,7 +326,7 @@ fn pixel_taps(
 }
 
 /// The photosites that a demosaicked frame was made of, and what no light reads in it, in the unit of its samples.
-fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
+pub(super) fn photosite_of(frame: &FrameHeader) -> Result<(Photosite, f64)> {
     let metadata = &frame.metadata;
     if metadata.is_transferred() || metadata.correction.as_ref().is_some_and(|correction| correction.cte.is_some()) {
         return Err(frame.refuse(

@@ -2,6 +2,7 @@
 
 use super::floor::Floor;
 use super::frame_levels::FrameLevels;
+use super::notes::of_sigma_beside_defects;
 use super::values;
 use crate::analysis::statistics::{MarkedRows, Saturated};
 use crate::error::{Error, Result};
@@ -329,6 +330,7 @@ impl Averaged {
             false => None,
         };
         if let Some(layers) = &layers {
+            warnings.extend(of_sigma_beside_defects(&header).map(|note| note.text().to_owned()));
             header.geometry.channels.extend(layers.names().iter().map(|name| (*name).to_owned()));
             header.metadata.uncertainty = Some(Coverage::of_colors(header.metadata.color.as_ref()));
         }

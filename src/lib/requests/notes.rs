@@ -4,6 +4,7 @@ use crate::analysis::statistics::{ChannelReport, RegionReport, RepeatedReport, R
 use crate::formats::input::FrameReader;
 use crate::metadata::{AdcRecord, FrameHeader, HistoryEntry, Metadata};
 use crate::propagation::pixels::{CoarseCodes, coarse_codes};
+use crate::propagation::{LeftOutTails, left_out_tails};
 use crate::stream::RowSource;
 use crate::text::{counted, in_decimals, in_digits};
 use crate::units::QuantityKind;
@@ -183,6 +184,43 @@ pub fn of_coarse_codes(frame: &FrameHeader) -> Option<Note> {
         in_decimals(most, 2),
         in_decimals(told_adu, 2)
     )))
+}
+
+/// A warning of standard deviations beside pixels that count hot pixels, or photosites that jump, although defects were left out; not where a
+/// program before gave it.
+pub fn of_sigma_beside_defects(frame: &FrameHeader) -> Option<Note> {
+    if has_sigma(frame) {
+        return None;
+    }
+    beside_defects(frame, true)
+}
+
+/// A warning of predictions that count hot pixels, or photosites that jump, which a list of defects may have named. Behind those that were found
+/// nothing is predicted.
+pub fn of_listed_defects(frame: &FrameHeader) -> Option<Note> {
+    beside_defects(frame, false)
+}
+
+fn beside_defects(frame: &FrameHeader, with_found: bool) -> Option<Note> {
+    /// What nobody would see of a standard deviation.
+    const LITTLE: f64 = 1e-3;
+    let LeftOutTails { are_found, at_most } = left_out_tails(frame)?;
+    let too_large = at_most - 1.0;
+    if too_large < LITTLE || are_found && !with_found {
+        return None;
+    }
+    let percent = in_digits(100.0 * too_large, 2);
+    let name = &frame.name;
+    Some(Note::Warning(match are_found {
+        true => format!(
+            "{name}: hot pixels or random telegraph signals that stand out were found and left out, but the standard deviations count them: they are up to \
+             {percent} % too large"
+        ),
+        false => format!(
+            "{name}: the noise that is told of it counts all hot pixels and random telegraph signals of its sensor; if its list of defects names such, \
+             standard deviations are up to {percent} % too large"
+        ),
+    }))
 }
 
 /// A warning of codes that are not proportional to charge, of which colors are made all the same.
