@@ -42,7 +42,7 @@ const QUIET: NoiseModel = NoiseModel {
         prnu_row: 0.0,
         prnu_column: 0.0,
     },
-    tails: Tails { hot_share: 0.0, hot_e: 0.0, rts_share: 0.0, rts_e: 0.0, trap_e: 0.0 },
+    tails: Tails { hot_share: 0.0, hot_e: 0.0, rts_share: 0.0, rts_e: 0.0, trap_e: 0.0, are_few: false },
 };
 
 const PAPER: AdcRecord = AdcRecord::new(12, 1753.0, 0.058824);

@@ -143,7 +143,7 @@ pub fn laguerre(nodes: usize) -> Vec<(f64, f64)> {
 }
 
 /// Places and weights by the matrix of the recurrence \[Golub and Welsch 1969].
-fn by_recurrence(recurrence: &DMatrix<f64>) -> Vec<(f64, f64)> {
+pub(crate) fn by_recurrence(recurrence: &DMatrix<f64>) -> Vec<(f64, f64)> {
     let solved = recurrence.clone().symmetric_eigen();
     let node = |(index, place): (usize, &f64)| (*place, solved.eigenvectors[(0, index)].powi(2));
     solved.eigenvalues.iter().enumerate().map(node).collect()

@@ -81,7 +81,7 @@ mod tests {
     fn law(light_e: f64, dark_e: f64, [prnu, dcnu]: [f64; 2], read_noise_e: f64) -> Law {
         let charge = |rate: f64, pattern: f64| Charge { rate, shot: Some(PoissonKind::Exact), pattern };
         let [light, dark] = [charge(light_e, prnu), charge(dark_e, dcnu)];
-        Law { light, dark, full_well_e: 1e6, read_noise_e, trap_e: 0.0 }
+        Law { light, dark, full_well_e: 1e6, read_noise_e, trap_e: 0.0, are_few: false }
     }
 
     /// The sum over normal laws, which is good to what it leaves out of rectification, and the closed form less what the ends take.

@@ -179,7 +179,8 @@ mod tests {
         Photosite { flat: Some(flat), ..site }
     }
 
-    const TAILS: Tails = Tails { hot_share: 0.03, hot_e: 90.0, rts_share: 0.1, rts_e: 15.0, trap_e: 0.0 };
+    const TAILS: Tails =
+        Tails { hot_share: 0.03, hot_e: 90.0, rts_share: 0.1, rts_e: 15.0, trap_e: 0.0, are_few: false };
 
     /// Of next to none moments are those of photosites that are all alike: sensitivities are then summed by seven nodes, not fifty.
     #[test]

@@ -12,7 +12,7 @@ use super::memory::Memory;
 use super::moments::Prediction;
 pub(super) use super::node::Law;
 use super::node::{MANY_WELLS, Node};
-use super::reading::{ENDLESS, Moments, Reading, codes_of};
+use super::reading::{Asked, ENDLESS, Moments, Reading, codes_of};
 use super::rectified::{corrections, signed_nodes};
 use crate::frame::to_sample;
 use crate::metadata::{AdcRecord, PoissonKind};
@@ -47,7 +47,8 @@ impl Law {
             dark.rate = 0.0;
         }
         let full_well_e = f64::from(to_sample(model.full_well_e));
-        Self { light, dark, full_well_e, read_noise_e: model.added(), trap_e: model.tails.trap_e }
+        let (trap_e, are_few) = (model.tails.trap_e, model.tails.are_few);
+        Self { light, dark, full_well_e, read_noise_e: model.added(), trap_e, are_few }
     }
 
     /// Whether full well is within reach of any photosite.
@@ -157,9 +158,16 @@ impl Law {
     fn each_node(&self, noise_e: f64, reading: &Reading, mut of: impl FnMut(Node)) {
         let idle = reading.idle_e();
         let is_idle = |mean: f64, reach: f64| idle[0] < mean - reach && mean + reach < idle[1];
+        // In tails normal laws are not as exact as what is asked of these.
+        let is_of_tails = matches!(reading.asked, Asked::Beyond(_)) && !self.are_few;
+        let is_met = |node: &Node| !is_idle(node.mean, REACH * node.std);
+        if let Some(laws) = (!is_of_tails).then(|| self.as_normals(noise_e)).flatten() {
+            effort::spend(1);
+            return laws.nodes().filter(is_met).for_each(of);
+        }
         if let Some(nodes) = self.nodes_of_sum(noise_e, reading.noise_e) {
             effort::spend(nodes.len() as u64);
-            return nodes.into_iter().filter(|node| !is_idle(node.mean, REACH * node.std)).for_each(of);
+            return nodes.into_iter().filter(is_met).for_each(of);
         }
         let is_light_wider = self.light.shot_std() >= self.dark.shot_std();
         let (wide, narrow) = if is_light_wider { (&self.light, &self.dark) } else { (&self.dark, &self.light) };
@@ -215,7 +223,7 @@ impl Law {
     fn nodes_of_sum(&self, noise_e: f64, added_e: f64) -> Option<Vec<Node>> {
         const MANY_PAIRS: f64 = 1000.0;
         const MOST_SCATTER: f64 = 1e-3;
-        const BLURRED_E: f64 = 2.0;
+        const BLURRED_E: f64 = 1.0;
         const APART_E: f64 = 0.1;
         let both = [&self.light, &self.dark];
         let is_counted = |charge: &Charge| charge.shot == Some(PoissonKind::Exact) && charge.shot_std() > 0.0;

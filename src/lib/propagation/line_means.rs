@@ -77,7 +77,11 @@ impl LineMeans {
     /// Of samples about the center that `about` has, where no less than `blur_e` blurs codes.
     pub fn of(kinds: &Kinds, about: &Law, adc: Option<AdcRecord>, blur_e: f64) -> Self {
         let reading = adc.map_or_else(|| about.of_electrons(), |adc| about.of_codes(&adc, codes_of(&adc)));
-        let is_smooth = adc.is_none_or(|adc| adc.linearization.is_none() && adc.adu_per_e * blur_e >= STRAIGHT);
+        // What hides codes is what all have of their own, or what each kind has.
+        let is_smooth = |law: &Law| {
+            let is_hidden = |adc: AdcRecord| adc.adu_per_e * blur_e >= STRAIGHT || law.counts_hide(&adc);
+            adc.is_none_or(|adc| adc.linearization.is_none() && is_hidden(adc))
+        };
         let kind = |(share, law): &(f64, Law)| {
             let electrons = law.of_electrons();
             let charge_e = || {
@@ -89,7 +93,7 @@ impl LineMeans {
             Kind {
                 share: *share,
                 law: *law,
-                charge_e: is_smooth.then(charge_e),
+                charge_e: is_smooth(law).then(charge_e),
                 reach_e: [least - noise_e, most + noise_e],
             }
         };

@@ -329,11 +329,6 @@ impl Photosite {
                 let is_bent = self.adc.as_ref().is_some_and(|adc| adc.is_bent() && !is_reached(adc));
                 Err(Unpredictable::Beyond(if is_bent { DRIFT_BENT } else { DRIFT_CUT }))
             }
-            Some(Regime::Curved)
-                if self.has_tails() && self.adc.as_ref().is_some_and(|adc| !is_cut_in_codes(adc) && is_within(adc)) =>
-            {
-                Err(Unpredictable::Beyond(COARSE_LINES))
-            }
             Some(regime) => Ok(regime),
             None => Err(Unpredictable::Beyond(TOO_COARSE)),
         }

@@ -44,6 +44,7 @@ mod mixed_pixel;
 mod mixture;
 pub mod moments;
 mod node;
+mod normal_laws;
 mod offsets;
 pub mod paper;
 mod pattern;

@@ -12,11 +12,13 @@ pub(super) struct Law {
     pub read_noise_e: f64,
     /// Amplitude of what readings are off by in half of the exposures, up or down.
     pub trap_e: f64,
+    /// Whether it is of few photosites, so that what sums over it leave out counts by their share.
+    pub are_few: bool,
 }
 
 impl Print for Law {
     fn print(&self, before: u64) -> u64 {
-        let numbers = [self.full_well_e, self.read_noise_e, self.trap_e];
+        let numbers = [self.full_well_e, self.read_noise_e, self.trap_e, f64::from(u8::from(self.are_few))];
         ([self.light, self.dark], numbers).print(before)
     }
 }

@@ -58,7 +58,7 @@ impl Seen {
     /// one code, or patterns are a millionth of what is drawn anew, 10⁻¹² of the variance.
     fn is_even(&self) -> bool {
         const NOTHING: f64 = 1e-6;
-        let Law { light, dark, full_well_e, read_noise_e, trap_e } = self.law;
+        let Law { light, dark, full_well_e, read_noise_e, trap_e, .. } = self.law;
         let [least, most] = self.law.extent();
         let is_one = || self.reading.is_one(least - trap_e, most.min(full_well_e) + trap_e);
         let drawn_e = light.shot_std().hypot(dark.shot_std()).hypot(read_noise_e);

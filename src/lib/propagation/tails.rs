@@ -156,6 +156,18 @@ impl Photosite {
         Self { model: self.model.at(state), darks: all(self.darks), flat, ..*self }
     }
 
+    /// The same of few photosites where these are no more than such a share of a frame.
+    fn if_few(&self, share: f64) -> Self {
+        /// Of these, normal laws are good to 10⁻⁴ of what they have.
+        const FEW: f64 = 0.01;
+        let are_few = share <= FEW;
+        let of = |model: NoiseModel| NoiseModel { tails: Tails { are_few, ..model.tails }, ..model };
+        let of_dark = |dark: Dark| Dark { model: of(dark.model), ..dark };
+        let all = |darks: [Option<Dark>; MOST_DARKS]| darks.map(|dark| dark.map(of_dark));
+        let flat = self.flat.map(|flat| Flat { frames: of_dark(flat.frames), darks: all(flat.darks), ..flat });
+        Self { model: of(self.model), darks: all(self.darks), flat, ..*self }
+    }
+
     /// That of the frames which have it.
     pub(super) fn most(&self, of: fn(&Tails) -> f64) -> f64 {
         self.models().map(|model| of(&model.tails)).fold(0.0, f64::max)
@@ -192,7 +204,12 @@ impl Photosite {
             if effort::is_spent() {
                 break;
             }
-            let quiet = Self { is_rare: self.is_rare_if(hot, weight, variance), ..self.at(&State { hot, trap: 0.0 }) };
+            let site = |trap: f64| match hot > 0.0 {
+                true => self.at(&State { hot, trap }).if_few(hot_share),
+                false if trap > 0.0 => self.at(&State { hot, trap }).if_few(trap_share),
+                false => self.at(&State { hot, trap }),
+            };
+            let quiet = Self { is_rare: self.is_rare_if(hot, weight, variance), ..site(0.0) };
             let jumps_apart = (hot == 0.0 || matter_if_hot) && jumps_show[index];
             let is_free = trap_share > 0.0 && !jumps_apart;
             let share = if jumps_apart { 1.0 - trap_share } else { 1.0 };
@@ -213,7 +230,7 @@ impl Photosite {
                 }
                 let (trap, of_trap) = traps[index];
                 let weight = weight * trap_share * of_trap / all;
-                found.push(Kind { weight, is_free: false, value: of(&self.at(&State { hot, trap })) });
+                found.push(Kind { weight, is_free: false, value: of(&site(trap)) });
             }
         }
         found
@@ -365,18 +382,27 @@ impl Photosite {
 
     /// What photosites of a line differ in, each of what a part of their noise leaves; for sums over the rest.
     pub(super) fn kinds_of_line(&self, expected_e: f64, part: impl Fn(&NoiseModel) -> NoiseModel) -> Kinds {
-        let law = |hot: f64| Law::of(&part(&self.model.at(&State { hot, trap: 0.0 })), expected_e);
         let [hot_share, trap_share, trap_e] =
             [|tails: &Tails| tails.hot_share, |tails: &Tails| tails.rts_share, |tails: &Tails| tails.rts_e]
                 .map(|of| self.most(of));
+        let law = |hot: f64| {
+            let site = self.at(&State { hot, trap: 0.0 });
+            Law::of(&part(&if hot > 0.0 { site.if_few(hot_share) } else { site }.model), expected_e)
+        };
         let of_share = |nodes: Option<Vec<(f64, f64)>>, share: f64| -> Vec<(f64, f64)> {
             let nodes = nodes.filter(|_| share > 0.0).unwrap_or_default();
             let sum: f64 = nodes.iter().map(|(_, weight)| weight).sum();
             nodes.into_iter().map(|(at, weight)| (share * weight / sum, at)).collect()
         };
-        let hot = of_share(self.hot_nodes(expected_e, Wanted::Variances), hot_share);
+        // Where what all have of their own does not hide codes, amplitudes show how these are rounded.
+        let is_coarse =
+            self.adc.is_some_and(|adc| adc.adu_per_e * blur_e(&part(&self.model), &adc, expected_e) < BLURRED);
+        let wanted = if is_coarse { Wanted::Moments } else { Wanted::Variances };
+        let hot = self.hot_nodes(expected_e, wanted).or_else(|| self.hot_nodes(expected_e, Wanted::Variances));
+        let hot = of_share(hot, hot_share);
         let jumps_show = trap_share > 0.0 && self.jumps_show(expected_e, trap_e);
-        let jumps = of_share(self.trap_nodes(expected_e, Wanted::Variances), if jumps_show { trap_share } else { 0.0 });
+        let jumps = self.trap_nodes(expected_e, wanted).or_else(|| self.trap_nodes(expected_e, Wanted::Variances));
+        let jumps = of_share(jumps, if jumps_show { trap_share } else { 0.0 });
         Kinds {
             laws: std::iter::once((1.0 - hot_share, 0.0)).chain(hot).map(|(share, hot)| (share, law(hot))).collect(),
             jumps: jumps.into_iter().map(|(share, trap)| (share, trap_e * trap)).collect(),

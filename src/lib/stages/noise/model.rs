@@ -45,6 +45,8 @@ pub struct Tails {
     pub rts_e: f64,
     /// Amplitude of the jumps of photosites that all have the same, e⁻.
     pub trap_e: f64,
+    /// Whether photosites of the model are few of a frame, so that what sums over them leave out counts by their share.
+    pub are_few: bool,
 }
 
 impl Tails {
@@ -177,6 +179,7 @@ impl NoiseModel {
                 rts_share: if_drawn(Source::Rts, readout.rts_share),
                 rts_e: if_drawn(Source::Rts, readout.rts_amplitude_e),
                 trap_e: 0.0,
+                are_few: false,
             },
         })
     }
