@@ -70,14 +70,22 @@ impl Law {
     /// 10¹⁵, 8 standard deviations off, and what skewness adds to that above.
     fn is_all_but_within(&self, adc: &AdcRecord) -> bool {
         const DEVIATIONS: f64 = 8.0;
-        const OF_SKEWNESS: f64 = (DEVIATIONS * DEVIATIONS - 1.0) / 6.0;
+        !self.is_rectified() && self.ends_are_off(adc, DEVIATIONS)
+    }
+
+    /// Whether so little is beyond an end that what lines share does not tell: one in 10¹⁰, 6.5 standard deviations off.
+    pub fn is_nearly_within(&self, adc: &AdcRecord) -> bool {
+        const DEVIATIONS: f64 = 6.5;
+        self.is_within(adc) || !self.is_rectified() && self.ends_are_off(adc, DEVIATIONS)
+    }
+
+    /// Whether both ends are so many standard deviations off the mean, and off what skewness adds to these.
+    fn ends_are_off(&self, adc: &AdcRecord, deviations: f64) -> bool {
         const SKEWED_E: f64 = 30.0;
-        if self.is_rectified() {
-            return false;
-        }
+        let of_skewness = (deviations * deviations - 1.0) / 6.0;
         let read = self.cumulants().plus(NearlyNormal::normal(0.0, self.read_noise_e.powi(2)));
-        let reach = DEVIATIONS * read.variance.sqrt();
-        let skewed = if read.third > 0.0 { OF_SKEWNESS * read.third / read.variance + SKEWED_E } else { 0.0 };
+        let reach = deviations * read.variance.sqrt();
+        let skewed = if read.third > 0.0 { of_skewness * read.third / read.variance + SKEWED_E } else { 0.0 };
         adc.electrons_at(0.0) < read.mean - reach - self.trap_e
             && adc.electrons_at(f64::from(adc.top_code())) > read.mean + reach + skewed + self.trap_e
     }
@@ -161,7 +169,7 @@ impl Law {
         // In tails normal laws are not as exact as what is asked of these.
         let is_of_tails = matches!(reading.asked, Asked::Beyond(_)) && !self.are_few;
         let is_met = |node: &Node| !is_idle(node.mean, REACH * node.std);
-        if let Some(laws) = (!is_of_tails).then(|| self.as_normals(noise_e)).flatten() {
+        if let Some(laws) = (!is_of_tails).then(|| self.as_normals(noise_e, reading.noise_e)).flatten() {
             effort::spend(1);
             return laws.nodes().filter(is_met).for_each(of);
         }
@@ -327,7 +335,9 @@ impl Law {
             signed_nodes(self).into_iter().for_each(put);
         }
         if !near.is_empty() {
-            add(1.0, at_full_well(&near, full, reading, at_full));
+            // Of few what their law below full well shows of rounding does not count.
+            let below_full = if self.are_few { reading.coarse() } else { *reading };
+            add(1.0, at_full_well(&near, full, &below_full, at_full));
         }
         add(1.0, corrections(self, reading, if is_full_far { f64::INFINITY } else { full }));
         sum

@@ -35,6 +35,11 @@ impl Kinds {
         &self.laws[0].1
     }
 
+    /// Takes out those that are few of a frame.
+    pub fn split_off_few(&mut self) -> Vec<(f64, Law)> {
+        self.laws.extract_if(1.., |(_, law)| law.are_few).collect()
+    }
+
     /// Those of lines whose photosites have this share of the light.
     pub fn gained(&self, share: f64) -> Self {
         let laws = self.laws.iter().map(|(weight, law)| (*weight, law.gained(share))).collect();
@@ -50,9 +55,85 @@ fn add(sum: &mut Pair, times: f64, pair: Pair) {
     sum.iter_mut().zip(pair).for_each(|(sum, of)| *sum += times * of);
 }
 
+/// What few photosites of a class, unlike most, add to its mean and square, by what is added to the charge and by the share of the light:
+/// polynomials of second degree through three places, for what lines share is less than what photosites have of their own, and of so few.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FewMeans {
+    at: Pair,
+    by_offset: Slopes,
+    by_share: Slopes,
+}
+
+/// First and second coefficients of a polynomial in what is so many times a scale.
+#[derive(Debug, Clone, Copy, Default)]
+struct Slopes {
+    scale: f64,
+    first: Pair,
+    second: Pair,
+}
+
+impl Slopes {
+    /// Through `at` and what is `below` and `above`, a scale to either side.
+    fn of(scale: f64, [below, at, above]: [Pair; 3]) -> Self {
+        let first = [0, 1].map(|k| 0.5 * (above[k] - below[k]));
+        let second = [0, 1].map(|k| 0.5 * (above[k] + below[k]) - at[k]);
+        Self { scale, first, second }
+    }
+
+    fn add_to(&self, sum: &mut Pair, place: f64) {
+        if self.scale > 0.0 {
+            let x = place / self.scale;
+            add(sum, x, self.first);
+            add(sum, x * x, self.second);
+        }
+    }
+}
+
+impl FewMeans {
+    /// Of such kinds about the center that `about` has, where what is added has the rms `offset_e`, and the share of the light `response`;
+    /// none of no kinds.
+    pub fn of(few: &[(f64, Law)], about: &Law, adc: Option<AdcRecord>, [offset_e, response]: [f64; 2]) -> Option<Self> {
+        // Places of Gauss's rule for three.
+        const PLACE: f64 = 1.732_050_807_568_877_2;
+        if few.is_empty() {
+            return None;
+        }
+        let all = |share: f64| {
+            let laws = few.iter().map(|(weight, law)| (*weight, law.gained(share))).collect();
+            LineMeans::of(&Kinds { laws, jumps: Vec::new() }, about, adc, f64::INFINITY)
+        };
+        let middle = all(1.0);
+        let at = middle.quiet(0.0);
+        let [offset_e, response] = [offset_e, response].map(|spread| PLACE * spread);
+        let by_offset = match offset_e > 0.0 {
+            true => Slopes::of(offset_e, [middle.quiet(-offset_e), at, middle.quiet(offset_e)]),
+            false => Slopes::default(),
+        };
+        let by_share = match response > 0.0 {
+            true => Slopes::of(response, [all(1.0 - response).quiet(0.0), at, all(1.0 + response).quiet(0.0)]),
+            false => Slopes::default(),
+        };
+        Some(Self { at, by_offset, by_share })
+    }
+
+    /// Of lines with this share of the light.
+    pub fn gained(&self, share: f64) -> Self {
+        let mut at = self.at;
+        self.by_share.add_to(&mut at, share - 1.0);
+        Self { at, ..*self }
+    }
+
+    fn at(&self, offset_e: f64) -> Pair {
+        let mut found = self.at;
+        self.by_offset.add_to(&mut found, offset_e);
+        found
+    }
+}
+
 /// The photosites of a class in one line.
 pub(super) struct LineMeans {
     kinds: Vec<Kind>,
+    few: Option<FewMeans>,
     jumps: Vec<(f64, f64)>,
     reading: Reading,
     adc: Option<AdcRecord>,
@@ -99,6 +180,7 @@ impl LineMeans {
         };
         Self {
             kinds: kinds.laws.iter().map(kind).collect(),
+            few: None,
             jumps: kinds.jumps.clone(),
             reading,
             adc,
@@ -124,6 +206,11 @@ impl LineMeans {
             add(&mut found, -0.5 * share, middle);
         }
         found
+    }
+
+    /// The same beside few others.
+    pub fn beside(self, few: Option<FewMeans>) -> Self {
+        Self { few, ..self }
     }
 
     /// The same where they are smooth on another scale.
@@ -182,7 +269,7 @@ impl LineMeans {
                 [first, second]
             }
         };
-        let mut found = [0.0; 2];
+        let mut found = self.few.map_or([0.0; 2], |few| few.at(offset_e));
         self.kinds.iter().for_each(|kind| add(&mut found, kind.share, pair(kind)));
         found
     }

@@ -10,7 +10,7 @@ use super::bent_lines::{BentLine, Given};
 use super::blur::blur_e;
 use super::effort;
 use super::law::Law;
-use super::line_means::{Kinds, LineMeans};
+use super::line_means::{FewMeans, Kinds, LineMeans};
 use super::lines::{Axis, COARSE_LINES, MOST_NODES, TOO_COARSE, nodes};
 use super::moments::LineCovariance;
 use super::photosite::Photosite;
@@ -60,6 +60,8 @@ struct Shared {
 struct Class {
     /// What is a photosite's own, or other lines'.
     kinds: Kinds,
+    /// Few others.
+    few: Option<FewMeans>,
     /// What of that blurs codes, e⁻.
     blur_e: f64,
     expected_e: f64,
@@ -151,7 +153,11 @@ type Lit = (Photosite, [f64; 3]);
 impl Shared {
     /// Goes through what is shared: how likely it is, and what it makes of the means of all classes and of their squares.
     fn each_value(&self, sites: &[Lit], of: impl FnMut(f64, [DVector<f64>; 2])) -> Predicted<()> {
-        let are_unlike = sites.iter().any(|(site, _)| site.has_tails());
+        let are_alike = |class: &Class| class.kinds.laws.len() == 1 && class.kinds.jumps.is_empty();
+        let are_unlike = match self.classes.iter().any(|class| class.averaging.is_some()) {
+            true => sites.iter().any(|(site, _)| site.has_tails()),
+            false => !self.classes.iter().all(are_alike),
+        };
         let most_work = if are_unlike { MOST_WORK_OF_UNLIKE } else { MOST_WORK };
         let found = effort::within(most_work, || self.each_within(are_unlike, of));
         found.unwrap_or(Err(Unpredictable::Beyond(TAKES_LONG)))
@@ -213,16 +219,18 @@ impl Shared {
         let part = |model: &NoiseModel| axes.iter().fold(*model, |rest, axis| axis.without(&rest));
         for (site, expected_e) in sites {
             let rest = part(&site.model);
-            // Of hot photosites that are full nothing blurs codes but what is added.
-            let of_full_e = if rest.tails.has_hot() { rest.added() } else { f64::INFINITY };
             for expected_e in *expected_e {
-                let (kinds, adc) = (site.kinds_of_line(expected_e, part), site.adc);
+                let (mut kinds, adc) = (site.kinds_of_line(expected_e, part), site.adc);
+                let few = if frames.is_none() { kinds.split_off_few() } else { Vec::new() };
+                let few = FewMeans::of(&few, kinds.most(), adc, [shared.offset_e, shared.response]);
+                // Of hot photosites that are full nothing blurs codes but what is added.
+                let of_full_e = if rest.tails.has_hot() && few.is_none() { rest.added() } else { f64::INFINITY };
                 let blur_e = adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e).min(of_full_e));
                 let is_same =
                     |class: &Class| class.kinds == kinds && class.adc == adc && class.expected_e == expected_e;
                 let same = shared.classes.iter().position(is_same).unwrap_or(shared.classes.len());
                 let averaging = frames.map(|frames| Averaging::of(site, expected_e, part, anew_e, frames));
-                shared.classes.push(Class { kinds, blur_e, expected_e, adc, same, averaging });
+                shared.classes.push(Class { kinds, few, blur_e, expected_e, adc, same, averaging });
             }
         }
         shared
@@ -233,7 +241,10 @@ impl Shared {
         let means = |k: usize, class: &'_ Class| {
             let about = self.classes[k].kinds.most();
             match &self.classes[k].averaging {
-                None => Means::OfOne(Box::new(LineMeans::of(&gained[k], about, class.adc, class.blur_e))),
+                None => {
+                    let few = class.few.map(|few| few.gained(share));
+                    Means::OfOne(Box::new(LineMeans::of(&gained[k], about, class.adc, class.blur_e).beside(few)))
+                }
                 Some(averaging) => Means::OfAverage(averaging.line(share, class.adc)),
             }
         };

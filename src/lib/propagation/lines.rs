@@ -314,7 +314,7 @@ impl Photosite {
         let is_blurred = |adc: &AdcRecord, least: f64| {
             expected_e.iter().zip(&laws).all(|(expected_e, law)| is_blurred(&own, law, adc, *expected_e, least))
         };
-        let is_within = |adc: &AdcRecord| !adc.is_bent() && laws.iter().all(|law| law.is_within(adc));
+        let is_within = |adc: &AdcRecord| !adc.is_bent() && laws.iter().all(|law| law.is_nearly_within(adc));
         // Of full photosites nothing blurs codes but what is added.
         let is_cut_in_codes = |adc: &AdcRecord| is_cut || is_full && adc.adu_per_e * own.added() < BLURRED;
         let found = match &self.adc {
@@ -325,7 +325,8 @@ impl Photosite {
         };
         match found {
             Some(Regime::Curved) if self.drifts() => {
-                let is_reached = |adc: &AdcRecord| is_cut_in_codes(adc) || laws.iter().any(|law| !law.is_within(adc));
+                let is_reached =
+                    |adc: &AdcRecord| is_cut_in_codes(adc) || laws.iter().any(|law| !law.is_nearly_within(adc));
                 let is_bent = self.adc.as_ref().is_some_and(|adc| adc.is_bent() && !is_reached(adc));
                 Err(Unpredictable::Beyond(if is_bent { DRIFT_BENT } else { DRIFT_CUT }))
             }

@@ -34,6 +34,9 @@ const MOST_PLACES: usize = 10;
 /// Moments, or cumulants, from order 0 on.
 type Orders = [f64; 2 * MOST_PLACES + 1];
 
+/// Few photosites of so many electrons are off by 10⁻⁴ of what they scatter by where they are counted to full well.
+const MANY_IF_FEW_E: f64 = 300.0;
+
 /// The largest non-uniformity of which next to none is cut off at zero.
 const MOST_PATTERN: f64 = 0.105;
 
@@ -54,15 +57,18 @@ impl NormalLaws {
 
 impl Law {
     /// The normal laws; none where they would not be as exact as the sum over counts should be, or that is as short. `noise_e` is what
-    /// blurs the charge before anything cuts it off.
-    pub(super) fn as_normals(&self, noise_e: f64) -> Option<NormalLaws> {
+    /// blurs the charge before anything cuts it off, `added_e` what does before it is read.
+    pub(super) fn as_normals(&self, noise_e: f64, added_e: f64) -> Option<NormalLaws> {
         thread_local! { static KNOWN: Memory<(Law, f64), Option<NormalLaws>> = const { Memory::new() }; }
         let wanted = if self.are_few { OF_FEW } else { OF_ALL };
         let both = [&self.light, &self.dark];
         let is_counted = |charge: &Charge| charge.shot == Some(PoissonKind::Exact) && charge.shot_std() > 0.0;
+        // Where full well cuts off counts that nothing blurs, that they are counted moves a mean by 1/12 of the density there.
+        let many = if self.are_few { MANY_IF_FEW_E } else { f64::INFINITY };
+        let blur_e = if both.into_iter().all(|charge| charge.rate < many) { noise_e } else { added_e };
         if self.has_floors()
             || both.into_iter().any(|charge| charge.pattern > MOST_PATTERN)
-            || both.into_iter().any(is_counted) && self.least_pattern_std().hypot(noise_e) < wanted.hidden_e
+            || both.into_iter().any(is_counted) && self.least_pattern_std().hypot(blur_e) < wanted.hidden_e
         {
             return None;
         }
@@ -125,27 +131,29 @@ impl Charge {
     }
 }
 
-/// C(n − 1, j − 1).
-fn choose(n: usize, j: usize) -> f64 {
-    static TABLE: LazyLock<Vec<[f64; 2 * MOST_PLACES]>> = LazyLock::new(|| {
-        let mut rows = vec![[0.0; 2 * MOST_PLACES]; 2 * MOST_PLACES];
-        for n in 0..rows.len() {
-            rows[n][0] = 1.0;
-            for j in 1..=n {
-                rows[n][j] = rows[n - 1][j - 1] + rows[n - 1][j];
-            }
+/// C(n, j).
+const BINOMIALS: [[f64; 2 * MOST_PLACES]; 2 * MOST_PLACES] = {
+    let mut rows = [[0.0; 2 * MOST_PLACES]; 2 * MOST_PLACES];
+    let mut n = 0;
+    while n < rows.len() {
+        rows[n][0] = 1.0;
+        let mut j = 1;
+        while j <= n {
+            rows[n][j] = rows[n - 1][j - 1] + rows[n - 1][j];
+            j += 1;
         }
-        rows
-    });
-    TABLE[n - 1][j - 1]
-}
+        n += 1;
+    }
+    rows
+};
 
 /// Moments about zero from cumulants: m_n = Σ C(n − 1, j − 1) κ_j m_(n − j).
 fn moments(cumulants: &Orders, orders: usize) -> Orders {
     let mut found = [0.0; 2 * MOST_PLACES + 1];
     found[0] = 1.0;
     for n in 1..=orders {
-        found[n] = (1..=n).map(|j| choose(n, j) * cumulants[j] * found[n - j]).sum();
+        let of_order = BINOMIALS[n - 1].iter().zip(&cumulants[1..=n]).zip(found[..n].iter().rev());
+        found[n] = of_order.map(|((binomial, cumulant), moment)| binomial * cumulant * moment).sum();
     }
     found
 }
@@ -154,7 +162,8 @@ fn moments(cumulants: &Orders, orders: usize) -> Orders {
 fn cumulants(moments: &Orders, orders: usize) -> Orders {
     let mut found = [0.0; 2 * MOST_PLACES + 1];
     for n in 1..=orders {
-        let before: f64 = (1..n).map(|j| choose(n, j) * found[j] * moments[n - j]).sum();
+        let of_order = BINOMIALS[n - 1].iter().zip(&found[1..n]).zip(moments[1..n].iter().rev());
+        let before: f64 = of_order.map(|((binomial, cumulant), moment)| binomial * cumulant * moment).sum();
         found[n] = moments[n] - before;
     }
     found
@@ -215,15 +224,15 @@ mod tests {
     #[test]
     fn normal_laws_are_read_as_the_counts_that_they_stand_for() {
         for (light_e, dark_e, patterns, are_few) in [
-            (1300.0, 5.0, [0.006, 0.1], false),
+            (2000.0, 5.0, [0.006, 0.1], false),
             (4000.0, 300.0, [0.02, 0.01], false),
             (1000.0, 40.0, [0.0, 0.0], false),
-            (30.0, 60.0, [0.01, 0.05], true),
+            (40.0, 100.0, [0.01, 0.02], true),
             (500.0, 200.0, [0.005, 0.003], true),
         ] {
             let law = law(light_e, dark_e, patterns, are_few);
             let [mean, std] = [law.cumulants().mean, law.cumulants().variance.sqrt()];
-            let laws = law.as_normals(1.0).unwrap();
+            let laws = law.as_normals(1.0, 1.0).unwrap();
             assert!((laws.nodes().map(|node| node.weight).sum::<f64>() - 1.0).abs() < 1e-12);
             for deviations in [-4.0, -2.0, -0.7, 0.0, 0.3, 1.5, 4.0] {
                 // The top code, 255, stands for so many electrons.
@@ -255,7 +264,7 @@ mod tests {
             (3000.0, 5.0, [0.2, 0.0], 2.0, false),
         ] {
             assert_eq!(
-                law(light_e, dark_e, patterns, are_few).as_normals(noise_e),
+                law(light_e, dark_e, patterns, are_few).as_normals(noise_e, noise_e),
                 None,
                 "{light_e} {patterns:?} {noise_e}"
             );

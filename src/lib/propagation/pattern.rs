@@ -70,6 +70,9 @@ impl Seen {
 /// Evaluations up to which counts are gone through one by one.
 const AFFORDABLE: usize = 6_000;
 
+/// The same of few photosites.
+const AFFORDABLE_IF_FEW: usize = 400;
+
 /// The same where rounding shows.
 const AFFORDABLE_IF_FINE: usize = 150_000;
 
@@ -230,7 +233,8 @@ impl<'a> Temporal<'a> {
         let noise_e = law.read_noise_e.max(1e-3);
         let [light, dark] = [law.light, law.dark].map(|charge| Charge { pattern: 0.0, ..charge });
         // More than are ever gone through are not listed.
-        let is_listed = light.least_counts(noise_e) * dark.least_counts(noise_e) <= AFFORDABLE_IF_FINE as f64;
+        let affordable = if law.are_few { AFFORDABLE_IF_FEW } else { AFFORDABLE_IF_FINE };
+        let is_listed = light.least_counts(noise_e) * dark.least_counts(noise_e) <= affordable as f64;
         let counts = |charge: &Charge| {
             let mut counts = if is_listed { charge.counts(noise_e) } else { Vec::new() };
             counts.retain(|count| count.weight > 1e-15);
@@ -264,7 +268,11 @@ impl<'a> Temporal<'a> {
 
     /// Evaluations up to which counts are gone through one by one.
     fn affordable(&self) -> usize {
-        if self.is_fine { AFFORDABLE_IF_FINE } else { AFFORDABLE }
+        match self.is_fine {
+            _ if self.law.are_few => AFFORDABLE_IF_FEW,
+            true => AFFORDABLE_IF_FINE,
+            false => AFFORDABLE,
+        }
     }
 
     /// How often counts are gone through at so many sensitivities; of more than are listed no number would do.

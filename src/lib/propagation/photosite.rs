@@ -298,7 +298,7 @@ impl Photosite {
             return shared;
         }
         let medians = [median_of, dark_median_of];
-        if !self.is_rare
+        if !(self.is_rare || self.model.tails.are_few)
             && let Some(exact) = self.shared_over_offsets(adc, [law, of_dark], (dark, medians), is_fine)
         {
             return exact;

@@ -205,7 +205,8 @@ impl Photosite {
     /// Whether they show it where full well, or an end of the codes, cuts off more than next to none.
     fn ends(&self, adc: &AdcRecord, expected_e: f64) -> bool {
         const NEXT_TO_NONE: f64 = 1e-7;
-        if self.is_rare || Dark::mean_of(self.model, 1).std_codes(adc, expected_e) >= VISIBLE_AT_ENDS {
+        let are_few = self.is_rare || self.model.tails.are_few;
+        if are_few || Dark::mean_of(self.model, 1).std_codes(adc, expected_e) >= VISIBLE_AT_ENDS {
             return false;
         }
         let law = Law::of(&self.model, expected_e);
