@@ -30,6 +30,7 @@ mod hostile;
 mod laws;
 mod leave_out;
 mod levels;
+mod likely;
 mod linearization;
 mod makers;
 mod mistakes;

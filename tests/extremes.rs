@@ -747,7 +747,7 @@ fn any_sensor(index: u64) -> (&'static str, CameraSetup, [f64; 3]) {
 }
 
 /// How long the prediction of one setting takes, CPU of all stages, and why it is refused where it is.
-fn predicted_in(setup: &CameraSetup, light: [f64; 3]) -> Option<(f64, Option<String>)> {
+pub fn predicted_in(setup: &CameraSetup, light: [f64; 3]) -> Option<(f64, Option<String>)> {
     setup.sensor.readout().unwrap().check().ok()?;
     let color = ColorSettings {
         xyz_from_camera: [[0.4, 0.3, 0.2], [0.2, 0.7, 0.1], [0.0, 0.1, 0.9]],

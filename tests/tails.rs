@@ -38,7 +38,7 @@ fn tailed(readout: &mut ReadOut) {
     readout.adu_per_e = 0.4;
 }
 
-fn scene(size: [usize; 2], electrons: [f32; 3], change: impl Fn(&mut ReadOut)) -> MemoryFrame {
+pub fn scene(size: [usize; 2], electrons: [f32; 3], change: impl Fn(&mut ReadOut)) -> MemoryFrame {
     let mut frame = expected(size[0], size[1], |_, _, class| electrons[class as usize]);
     frame.header.metadata.scene = Some(Scene::uniform("test", electrons.map(f64::from)));
     with_readout(&mut frame, change);
@@ -50,7 +50,7 @@ fn told(frame: &MemoryFrame) -> Option<RegionReport> {
     of_frame(&frame.header, Equations::Exact).is_ok().then(|| report(frame))
 }
 
-fn report(frame: &MemoryFrame) -> RegionReport {
+pub fn report(frame: &MemoryFrame) -> RegionReport {
     let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
     let none: [Region; 0] = [];
     measure(&mut source, &none, Saturated::Kept, Equations::Exact, Some(0.5)).unwrap().regions.remove(0)
@@ -231,10 +231,10 @@ fn chain(scene: &MemoryFrame, seed: u64) -> Vec<MemoryFrame> {
 }
 
 /// Even numbers.
-struct Random(u32, u32);
+pub struct Random(pub u32, pub u32);
 
 impl Random {
-    fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
         self.1 += 1;
         let [word, ..] = philox4x32_10([self.1, 0, 0, 0], [self.0, 77]);
         low + (high - low) * f64::from(word) * 2f64.powi(-32)
