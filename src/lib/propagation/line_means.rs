@@ -163,6 +163,9 @@ impl LineMeans {
             let is_hidden = |adc: AdcRecord| adc.adu_per_e * blur_e >= STRAIGHT || law.counts_hide(&adc);
             adc.is_none_or(|adc| adc.linearization.is_none() && is_hidden(adc))
         };
+        let ends_e = adc.map_or([f64::NEG_INFINITY, f64::INFINITY], |adc| {
+            [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code))
+        });
         let kind = |(share, law): &(f64, Law)| {
             let electrons = law.of_electrons();
             let charge_e = || {
@@ -171,12 +174,10 @@ impl LineMeans {
             };
             let [least, most] = law.extent().map(|charge| charge.min(law.full_well_e));
             let noise_e = REACH * law.read_noise_e;
-            Kind {
-                share: *share,
-                law: *law,
-                charge_e: is_smooth(law).then(charge_e),
-                reach_e: [least - noise_e, most + noise_e],
-            }
+            let reach_e = [least - noise_e, most + noise_e];
+            // Of those that an end is within reach of it is not asked.
+            let is_asked = adc.is_none_or(|_| reach_e[0] > ends_e[0] && reach_e[1] < ends_e[1]);
+            Kind { share: *share, law: *law, charge_e: (is_asked && is_smooth(law)).then(charge_e), reach_e }
         };
         Self {
             kinds: kinds.laws.iter().map(kind).collect(),
@@ -184,9 +185,7 @@ impl LineMeans {
             jumps: kinds.jumps.clone(),
             reading,
             adc,
-            ends_e: adc.map_or([f64::NEG_INFINITY, f64::INFINITY], |adc| {
-                [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code))
-            }),
+            ends_e,
             spacing_e: DISTANCE * blur_e,
             known: RefCell::default(),
         }

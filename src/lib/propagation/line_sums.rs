@@ -222,13 +222,15 @@ impl Shared {
             for expected_e in *expected_e {
                 let (mut kinds, adc) = (site.kinds_of_line(expected_e, part), site.adc);
                 let few = if frames.is_none() { kinds.split_off_few() } else { Vec::new() };
-                let few = FewMeans::of(&few, kinds.most(), adc, [shared.offset_e, shared.response]);
                 // Of hot photosites that are full nothing blurs codes but what is added.
-                let of_full_e = if rest.tails.has_hot() && few.is_none() { rest.added() } else { f64::INFINITY };
+                let of_full_e = if rest.tails.has_hot() && few.is_empty() { rest.added() } else { f64::INFINITY };
                 let blur_e = adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e).min(of_full_e));
                 let is_same =
                     |class: &Class| class.kinds == kinds && class.adc == adc && class.expected_e == expected_e;
                 let same = shared.classes.iter().position(is_same).unwrap_or(shared.classes.len());
+                let is_told = same == shared.classes.len();
+                let spreads = [shared.offset_e, shared.response];
+                let few = is_told.then(|| FewMeans::of(&few, kinds.most(), adc, spreads)).flatten();
                 let averaging = frames.map(|frames| Averaging::of(site, expected_e, part, anew_e, frames));
                 shared.classes.push(Class { kinds, few, blur_e, expected_e, adc, same, averaging });
             }
