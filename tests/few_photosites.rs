@@ -107,7 +107,7 @@ fn tells_few(found: &ClassFindings, what: &str) -> bool {
 
 /// Of cameras without any, and with 1, 3 or 5 hot photosites and as many that jump among 3072 on average, each number lies within its interval as often as
 /// is stated: that of the photosites which there are. No measurement tells the law by which they were drawn, as of 1 on average 37 of 100 cameras
-/// have none. That few make up what a number would differ by is said of most that have 5, and of none that has none.
+/// have none. That few make up what a number would differ by is said of a third and more that have 5, and of none that has none.
 #[test]
 fn numbers_are_those_of_the_photosites_there_are() {
     let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(24, |count| count.parse().unwrap());
@@ -133,7 +133,7 @@ fn numbers_are_those_of_the_photosites_there_are() {
         eprintln!("{hot} hot, {jumping} jump: told of {told:?} of {count}");
         for (few, told) in [hot, jumping].into_iter().zip(told) {
             assert!(few > 0.0 || jumping + hot > 0.0 || told == 0, "told of {told} without any");
-            assert!(few < 5.0 || 2 * told > count as usize, "of {few} told of {told} of {count} alone");
+            assert!(few < 5.0 || 3 * told > count as usize, "of {few} told of {told} of {count} alone");
         }
     }
 }
