@@ -23,6 +23,7 @@ mod everyday;
 mod examples;
 mod examples_of_help;
 mod extremes;
+mod few_photosites;
 mod flats;
 mod floors;
 mod front;

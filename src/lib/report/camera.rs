@@ -162,6 +162,7 @@ fn channel(class: &ClassFindings, views: &[Option<PatternView>; 2]) -> Value {
     if let Some(patterns) = patterns_of(views) {
         all.insert("patterns".into(), patterns);
     }
+    all.insert("doubts".into(), json!(class.doubts));
     all.insert("notes".into(), json!(class.notes));
     all.into()
 }
@@ -232,6 +233,9 @@ fn text(camera: &MeasuredCamera) -> String {
         for (why, keys) in reasons {
             let _ = writeln!(out, "not determined: {}: {why}", keys.join(", "));
         }
+        for doubt in &class.doubts {
+            let _ = writeln!(out, "in doubt: {doubt}");
+        }
         for (view, place) in views.iter().zip(["under light", "in the dark"]) {
             out.push_str(&view.as_ref().map_or(String::new(), |view| outstanding(view, place) + "\n"));
         }
@@ -254,6 +258,10 @@ fn markdown(camera: &MeasuredCamera) -> String {
         let lines: Vec<String> = untold.map(|(key, why)| format!("- `{key}`: {why}\n")).collect();
         if !lines.is_empty() {
             let _ = write!(out, "\nNot determined:\n\n{}", lines.concat());
+        }
+        if !class.doubts.is_empty() {
+            let doubts: Vec<String> = class.doubts.iter().map(|doubt| format!("- {}\n", escaped(doubt))).collect();
+            let _ = write!(out, "\nIn doubt:\n\n{}", doubts.concat());
         }
         for (view, place) in views.iter().zip(["under light", "in the dark"]) {
             out.push_str(&view.as_ref().map_or(String::new(), |view| format!("\n{}.\n", outstanding(view, place))));

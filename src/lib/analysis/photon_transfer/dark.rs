@@ -1,7 +1,7 @@
 //! What darks tell beyond one temperature and one exposure time: how dark current rises with temperature, and how it differs from
 //! photosite to photosite.
 
-use super::curve::{are_whole, is_clipped};
+use super::curve::{are_whole, is_clipped, relative_scatter};
 use super::fit::{Line, Point};
 use super::level::Level;
 use super::pattern::{Part, hidden_pattern, temporal};
@@ -119,17 +119,40 @@ pub fn pixel_noise(darks: &[&Level], rounding: f64, confidence: f64) -> Interval
     let mut times: Vec<f64> = whole.iter().filter_map(|dark| dark.condition.exposure_s).collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
-    let point = |dark: &&Level| {
-        let own = dark.variance_variance + dark.hidden(rounding).variance.powi(2);
-        Some((dark.condition.exposure_s?, temporal(&[*dark], Part::Pixel, confidence).value, own))
-    };
-    let points: Vec<(f64, f64, f64)> = whole.iter().filter_map(point).collect();
-    if let Some((line, [of_offset, _])) = fitted(&points, confidence).filter(|_| times.len() >= 3) {
+    let of_line = noise_over_time(&whole, rounding, confidence).filter(|_| times.len() >= 3);
+    if let Some((line, [of_offset, _])) = of_line {
         return with_hidden(Interval::normal(line.offset, of_offset, confidence), hidden(&whole));
     }
     let shortest = darks.iter().map(|dark| time(dark)).fold(f64::INFINITY, f64::min);
     let short: Vec<&Level> = darks.iter().copied().filter(|dark| time(dark) <= shortest).collect();
     with_hidden(temporal(&short, Part::Pixel, confidence), hidden(&short))
+}
+
+/// The line through temporal variances of single photosites of darks over time, as [`fitted`] has it. Where these scatter by far more than those of normal
+/// noise, as where few photosites jump, what each of them scatters by is itself chance, and one that is low by chance would count more: there each scatters
+/// as the line has it, and as all of them together do.
+fn noise_over_time(darks: &[&Level], rounding: f64, confidence: f64) -> Option<(Line, [f64; 2])> {
+    /// So many times what normal noise scatters by is far more: a variance.
+    const FAR: f64 = 4.0;
+    /// Relative variance of a variance of normal noise, times its freedom.
+    const NORMAL: f64 = 2.0;
+    let relative = relative_scatter(darks.iter().map(|dark| (dark.freedom(), dark.variance, dark.variance_variance)));
+    let of = |line: Option<Line>| {
+        let point = |dark: &&Level| {
+            let (time, value) = (dark.condition.exposure_s?, temporal(&[*dark], Part::Pixel, confidence).value);
+            let level = line.map_or(value, |line| line.at(time)).max(rounding).max(0.5 * value);
+            let scatter = if relative > FAR * NORMAL {
+                relative / dark.freedom() * level * level
+            } else {
+                dark.variance_variance
+            };
+            Some((time, value, scatter + dark.hidden(rounding).variance.powi(2)))
+        };
+        fitted(&darks.iter().filter_map(point).collect::<Vec<_>>(), confidence)
+    };
+    let first = of(None).map(|(line, _)| line);
+    let second = of(first).map(|(line, _)| line);
+    of(second)
 }
 
 /// What single photosites of a dark differ by.

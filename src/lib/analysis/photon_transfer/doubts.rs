@@ -44,7 +44,7 @@ pub fn doubts(curve: &Curve, flats: &[Level], suspects: &[Suspect], confidence: 
         exchanged(curve, flats),
         missed(curve),
         drifting(curve, flats),
-        bent(curve, confidence).or_else(|| curved(curve)).filter(|_| !is_named),
+        bent(curve, confidence).or_else(|| curved(curve)).or_else(|| unlit(curve, confidence)).filter(|_| !is_named),
         cut_off(curve, flats).or_else(|| smoothed(curve, flats)),
     ];
     all.into_iter().flatten().collect()
@@ -169,9 +169,7 @@ fn cut_off(curve: &Curve, flats: &[Level]) -> Option<String> {
 /// A response that bends, which the variances follow and their scatter hides.
 fn bent(curve: &Curve, confidence: f64) -> Option<String> {
     let bend = curve.bend()?;
-    let missed = bend.missed;
-    let gain = curve.interval(|values| Some(values.gain), confidence)?;
-    let width = (gain.high - gain.low) / (2.0 * gain.value);
+    let (missed, width) = (bend.missed, width_of_gain(curve, confidence)?);
     // More than half of what the interval has room for.
     let is_told = bend.is_sure() && missed.abs() > width / 2.0;
     is_told.then(|| {
@@ -180,6 +178,67 @@ fn bent(curve: &Curve, confidence: f64) -> Option<String> {
              little light; its interval, {:.1} %, is that of the slope",
             missed.abs() * 100.0,
             if missed > 0.0 { "more" } else { "less" },
+            width * 100.0
+        )
+    })
+}
+
+/// Half of the interval of the gain, a share of it.
+fn width_of_gain(curve: &Curve, confidence: f64) -> Option<f64> {
+    let gain = curve.interval(|values| Some(values.gain), confidence)?;
+    Some((gain.high - gain.low) / (2.0 * gain.value))
+}
+
+/// A share of the gain, in words.
+fn more_or_less(share: f64) -> String {
+    format!("{:.1} % {}", share.abs() * 100.0, if share > 0.0 { "more" } else { "less" })
+}
+
+/// Why no light tells whether the response is straight, and which frames would; none where it does.
+fn why_unlit(curve: &Curve) -> Option<[&'static str; 2]> {
+    const NO_BLACK: [&str; 2] = ["no darks tell black beneath the flats", "darks of their exposure times"];
+    const NO_LIGHT: [&str; 2] = [
+        "the light of the flats is not known",
+        "flats of known photons, or of several exposure times under one light,",
+    ];
+    (!curve.tells_bend()).then(|| if curve.knows_light() { NO_BLACK } else { NO_LIGHT })
+}
+
+/// A response that bends, as the variances of flats alone tell it, where no light does.
+fn unlit(curve: &Curve, confidence: f64) -> Option<String> {
+    let [why, wanted] = why_unlit(curve)?;
+    let (width, bend) = (width_of_gain(curve, confidence)?, curve.bend_of_noise()?);
+    let interval = bend.interval(confidence);
+    let [low, high] = [interval.low, interval.high].map(more_or_less);
+    (bend.is_sure() && bend.missed.abs() > width / 2.0).then(|| {
+        format!(
+            "variances of flats bend over their mean, as of a response that bends or charge that photosites share: the gain, the slope of the whole \
+             photon transfer curve, is about {} than that of little light ({low} to {high}); its interval, {:.1} %, is that of the slope; {why}: \
+             {wanted} would tell how straight the response is",
+            more_or_less(bend.missed),
+            width * 100.0
+        )
+    })
+}
+
+/// What is said beside why the linearity is not told: by how much a response that bends may have the gain off, where variances alone tell it
+/// and the interval of the gain has no room for that.
+pub fn gain_in_doubt(curve: &Curve, confidence: f64) -> Option<String> {
+    let [why, wanted] = why_unlit(curve)?;
+    let width = width_of_gain(curve, confidence)?;
+    let Some(bend) = curve.bend_of_noise() else {
+        return Some(format!(
+            "nothing tells whether the response is straight, as {why}: where it bends by a share of the signal of the brightest flat, the gain is off \
+             by up to three times that share; {wanted} would tell"
+        ));
+    };
+    let interval = bend.interval(confidence);
+    let is_within = interval.low.abs().max(interval.high.abs()) <= width;
+    let [low, high] = [interval.low, interval.high].map(more_or_less);
+    (!is_within).then(|| {
+        format!(
+            "nothing but their variances tells whether the response is straight, as {why}: by these the gain, the slope of the whole photon \
+             transfer curve, is {low} to {high} than that of little light, and its interval, {:.1} %, is that of the slope; {wanted} would tell",
             width * 100.0
         )
     })
@@ -202,6 +261,7 @@ mod tests {
     use super::super::findings::of_class;
     use super::super::level::{Condition, Level};
     use super::super::settings::Settings;
+    use super::super::sheet::ClassFindings;
     use super::super::strangers::tests::normal;
     use super::super::survey::survey;
     use crate::frame::{Geometry, to_sample};
@@ -225,15 +285,21 @@ mod tests {
         Level::of(key as usize, condition, sites)
     }
 
-    /// What is doubted of six flats and their darks.
-    fn doubted(change: &dyn Fn(f64) -> f64, drop_adu: f64) -> Vec<String> {
+    /// What is doubted of six flats, of exposure times in proportion to their light or all of one, and their darks.
+    fn doubted(change: &dyn Fn(f64) -> f64, drop_adu: f64, is_timed: bool) -> Vec<String> {
+        measured(change, drop_adu, is_timed).doubts
+    }
+
+    /// What is found of them.
+    fn measured(change: &dyn Fn(f64) -> f64, drop_adu: f64, is_timed: bool) -> ClassFindings {
         let times = || (1..=6_u32).map(|time| (time, 0.01 * f64::from(time)));
-        let flats: Vec<Level> = times().map(|(key, s)| level(40_000.0 * s, s, key, change)).collect();
+        let flat = |(key, s): (u32, f64)| level(40_000.0 * s, if is_timed { s } else { 0.01 }, key, change);
+        let flats: Vec<Level> = times().map(flat).collect();
         let dark = |(key, s): (u32, f64)| level(0.0, s, 10 + key, &|code| change(code - drop_adu * f64::from(key)));
         let darks: Vec<Level> = times().map(dark).collect();
         let settings =
             Settings { confidence: 0.95, photon_error: 0.0, are_codes: true, top: Some(4095.0), corrected: None };
-        of_class("Y", &flats, &darks, &darks, &settings).doubts
+        of_class("Y", &flats, &darks, &darks, &settings)
     }
 
     /// A gamma of 1.2 is told, by variances or by the light, and a straight response is not. Means of darks of 2 codes over two frames of 4096 photosites scatter by 0.02
@@ -244,10 +310,24 @@ mod tests {
         let falls = |doubts: &[String]| doubts.iter().any(|doubt| doubt.contains("the dark signal falls"));
         let straight = |code: f64| code;
         for (drop_adu, wanted) in [(0.0, false), (0.012, false), (0.2, true)] {
-            let doubts = doubted(&straight, drop_adu);
+            let doubts = doubted(&straight, drop_adu, true);
             assert_eq!([bends(&doubts), falls(&doubts)], [false, wanted], "{drop_adu}: {doubts:?}");
         }
-        let doubts = doubted(&|code| 4095.0 * (code / 4095.0).powf(1.0 / 1.2), 0.0);
+        let doubts = doubted(&|code| 4095.0 * (code / 4095.0).powf(1.0 / 1.2), 0.0, true);
         assert!(bends(&doubts), "{doubts:?}");
+    }
+
+    /// Flats of which no light is known leave it in doubt whether the response is straight, which is said where the linearity is not told; those of
+    /// known light do not.
+    #[test]
+    fn light_that_is_not_known_leaves_the_response_in_doubt() {
+        let words = "tells whether the response is straight, as the light of the flats is not known";
+        for (is_timed, wanted) in [(true, false), (false, true)] {
+            let found = measured(&|code| code, 0.0, is_timed);
+            let finding = found.findings.iter().find(|finding| finding.key == "linearity_error_max").unwrap();
+            let is_told = finding.found.as_ref().is_err_and(|why| why.contains(words));
+            assert_eq!(is_told, wanted, "{finding:?}");
+            assert!(!found.doubts.iter().any(|doubt| doubt.contains("bend")), "{:?}", found.doubts);
+        }
     }
 }

@@ -2,12 +2,13 @@
 
 use super::curve::{Curve, Values, below_saturation, first_cut, stuck_shares, without_clipped, without_stuck};
 use super::dark::{doubling_temperature, parted_pattern, pixel_noise};
-use super::doubts::doubts;
+use super::doubts::{doubts, gain_in_doubt};
+use super::few::told_of_few;
 use super::level::{Level, is_same_time};
 use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
 use super::pattern::{Part, drift_of, fixed, of_light, temporal, with_hidden};
-use super::reasons::{DRIFT_OF_FEW_ROWS, LOST_DARK, NO_NOISE, Reasons, of_gain, time_of_noise};
+use super::reasons::{DRIFT_OF_FEW_ROWS, LOST_DARK, NO_NOISE, Reasons, frames_of_noise, of_gain, time_of_noise};
 use super::rounding::{Steps, least_normal};
 use super::row_drift::RowDrift;
 use super::scatter::Scatter;
@@ -116,6 +117,8 @@ pub fn of_class(
     };
     add("dynamic_range", saturation_e.and_then(|saturation| Ok(range(saturation, threshold_e?))));
     let straight = straightness(reasons, &scatter, confidence);
+    let in_doubt = gain_in_doubt(&curve, confidence);
+    let straight = straight.map_err(|why| in_doubt.iter().fold(why, |why, doubt| format!("{why}; {doubt}")));
     for (key, end) in [("linearity_error_min", 0), ("linearity_error_max", 1)] {
         add(key, straight.as_ref().map(|line| line.extremes[end]).map_err(Clone::clone));
     }
@@ -161,6 +164,7 @@ pub fn of_class(
     }
     let (curve_points, values) = (points.collect(), curve.values());
     let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames), &limit);
+    notes.extend(told_of_few(&repeated.iter().map(|dark| (*dark).clone()).collect::<Vec<_>>()));
     notes.extend(drift.map(|RowDrift { variance, .. }| {
         format!(
             "the black level drifts along rows, by {} e- rms: that is in temporal dark noise, and not in that of rows",
@@ -336,6 +340,8 @@ fn add_patterns(
 }
 
 fn notes(curve: &Curve, flats: &[Level], frames: Option<usize>, limit: &Limit) -> Vec<String> {
+    /// Of as many darks each photosite that jumps has done so but one in ten.
+    const ENOUGH: f64 = 4.0;
     let mut notes: Vec<String> = limit.told.iter().cloned().collect();
     if let Some(cut) = curve.cut_from {
         notes.push(format!(
@@ -366,6 +372,7 @@ fn notes(curve: &Curve, flats: &[Level], frames: Option<usize>, limit: &Limit) -
         );
     }
     notes.extend(curve.values().and_then(|values| values.dark_variance).and(curve.time_of_noise()).map(time_of_noise));
+    notes.extend(curve.frames_of_noise().filter(|frames| *frames < ENOUGH).map(frames_of_noise));
     let lit = flats.iter().filter(|flat| flat.condition.photons.is_none()).count();
     if lit > 0 && flats.iter().any(|flat| flat.condition.photons.is_some()) {
         notes.push(format!("{lit} flats have no number of photons, and do not count for the responsivity"));

@@ -7,6 +7,7 @@ mod curve;
 mod dark;
 mod doubts;
 mod falling;
+mod few;
 mod findings;
 mod fit;
 mod hot;

@@ -31,6 +31,14 @@ pub fn time_of_noise(time_s: Option<f64>) -> String {
     )
 }
 
+/// What is said of dark noise of so few darks.
+pub fn frames_of_noise(frames: f64) -> String {
+    format!(
+        "temporal dark noise is that of {frames} darks: photosites that jump, and did not between them, are not in it, which four darks or more of \
+         the shortest exposure time would show"
+    )
+}
+
 /// The levels that reasons are told of.
 #[derive(Clone, Copy)]
 pub struct Reasons<'a> {

@@ -39,6 +39,10 @@ pub struct SiteSurvey {
     pub spatial: MeanSquares,
     /// Fourth cumulant of the mean of the frames at single photosites, 0 or more, by the differences of neighbors: half of theirs.
     pub fourth: f64,
+    /// Sums that tell how many photosites make up that cumulant: Σ d⁴ and 2 Σ d⁸, d the differences of neighbors.
+    pub of_steps: [f64; 2],
+    /// The same of the scatter of the temporal variance: Σ q² and Σ q⁴, q the sum of squares of a photosite over the frames.
+    pub of_noise: [f64; 2],
     /// Means of the frames.
     pub frame_means: Vec<f64>,
     /// Excess kurtosis of the temporal noise, and what it scatters by, a variance.

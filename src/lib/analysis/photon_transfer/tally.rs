@@ -54,10 +54,10 @@ pub struct Tally {
     neighbors: NeighborSums,
     /// How noise goes with ȳ.
     falling: FallingSums,
-    /// Σ d² and Σ d⁴, d the differences of ȳ between neighbors in a row.
-    steps: [f64; 2],
-    /// Σ q and Σ q², q the sum of squares of a photosite about its row.
-    within: [f64; 2],
+    /// Σ d², Σ d⁴ and Σ d⁸, d the differences of ȳ between neighbors in a row.
+    steps: [f64; 3],
+    /// Σ q, Σ q² and Σ q⁴, q the sum of squares of a photosite about its row.
+    within: [f64; 3],
     /// Samples of the row, `[frame][column]`, their means, and q.
     samples: Vec<f64>,
     means: Vec<f64>,
@@ -98,8 +98,8 @@ impl Tally {
             slopes: RowSlopes::new(frames),
             neighbors: NeighborSums::new(columns, if frames == 2 { 1 } else { frames }),
             falling: FallingSums::default(),
-            steps: [0.0; 2],
-            within: [0.0; 2],
+            steps: [0.0; 3],
+            within: [0.0; 3],
             samples: vec![0.0; columns * frames],
             means: vec![0.0; columns],
             squared: vec![0.0; columns],
@@ -223,7 +223,8 @@ impl Tally {
             *squared = (pair[1] - pair[0]).powi(2);
         }
         let squared = &self.squared[..columns - 1];
-        let of_steps = [sum(squared), dot(squared, squared)];
+        let [second, fourth] = [sum(squared), dot(squared, squared)];
+        let of_steps = [second, fourth, fourth_powers(squared)];
         self.steps.iter_mut().zip(of_steps).for_each(|(sum, of_row)| *sum += of_row);
         self.squared.fill(0.0);
         let (summed, times, row) = (self.summed(), self.times(), self.row_means.len() - 1);
@@ -253,12 +254,13 @@ impl Tally {
         self.falling.add(&self.squared, &self.above);
         self.within[0] += times * sum(&self.squared);
         self.within[1] += times * times * dot(&self.squared, &self.squared);
+        self.within[2] += times.powi(4) * fourth_powers(&self.squared);
     }
 
     /// Fourth cumulant of single photosites: that of differences, m₄ − 3 m₂², is twice as large.
     fn fourth(&self) -> f64 {
         let steps = ((self.size[0] - 1) * self.size[1]) as f64;
-        let [second, fourth] = self.steps.map(|sum| sum / steps);
+        let [second, fourth, _] = self.steps.map(|sum| sum / steps);
         ((fourth - 3.0 * second * second) / 2.0).max(0.0)
     }
 
@@ -361,14 +363,17 @@ impl Tally {
             - spatial_sum * slopes.iter().map(|slope| slope * slope).sum::<f64>();
         let sums = SquareSums { all, rows: columns * by_rows, columns: rows * by_columns };
         let temporal = MeanSquares::of(sums, self.size, frames - 1.0);
+        let noise_of_mean = of_mean(&temporal);
         let fourth = self.fourth();
         let spatial = MeanSquares::of(spatial, self.size, 1.0).with_tails(fourth, n);
         let variance = all.max(0.0) / ((frames - 1.0) * (n - 2.0));
+        // Photosites of unlike noise, as those that jump, make it scatter by more than normal ones alike do.
+        let temporal = temporal.with_tails(self.temporal_tails(variance), 1.0);
         SiteSurvey {
             frames: self.frames,
             size: self.size,
             mean,
-            mean_variance: of_mean(&temporal) / (n * frames),
+            mean_variance: noise_of_mean / (n * frames),
             variance,
             variance_variance: self.variance_variance(&drifts, n),
             at_ends: self.at_ends,
@@ -380,13 +385,30 @@ impl Tally {
             temporal,
             row_scatter,
             spatial,
-            excess: excess(self.within, self.frames, n),
+            excess: excess([self.within[0], self.within[1]], self.frames, n),
             falling: self.falling.finish(frames, times),
             neighbors: self.neighbors.finish(self.frames),
             fourth,
+            // A photosite has two neighbors.
+            of_steps: [self.steps[1], self.steps[2] * 2.0],
+            of_noise: [self.within[1], self.within[2]],
             frame_means: drifts.iter().map(|drift| mean + drift).collect(),
             copies,
         }
+    }
+
+    /// What the sum of the squares of all photosites scatters by, a variance, as they do apart from rows and columns.
+    fn apart(&self) -> f64 {
+        let [columns, rows] = self.size.map(|extent| extent as f64);
+        let [sum, squares, _] = self.within;
+        // Sums of squares about the rows have lost a share of 1/columns.
+        (squares - sum * sum / (rows * columns)).max(0.0) * (1.0 + 2.0 / columns)
+    }
+
+    /// What such a temporal variance scatters by beyond that of as many normal samples, a variance.
+    fn temporal_tails(&self, variance: f64) -> f64 {
+        let freedom = (self.frames as f64 - 1.0) * (self.size[0] * self.size[1]) as f64;
+        (self.apart() / (freedom * freedom) - 2.0 * variance * variance / freedom).max(0.0)
     }
 
     /// What the temporal variance scatters by. Rows beside rows and columns beside columns are compared, so that light which
@@ -412,9 +434,7 @@ impl Tally {
                 centered(*square, &mut sums, rows)
             })
             .collect();
-        let [sum, squares] = self.within;
-        // Sums of squares about the rows have lost a share of 1/columns.
-        let apart = (squares - sum * sum / n).max(0.0) * (1.0 + 2.0 / columns);
+        let apart = self.apart();
         let together = |sums: &[f64]| {
             let steps: f64 = sums.windows(2).map(|two| (two[1] - two[0]).powi(2)).sum();
             let scatter = 0.5 * steps / (sums.len() as f64 - 1.0) * sums.len() as f64;
@@ -423,6 +443,12 @@ impl Tally {
         let freedom = (self.frames as f64 - 1.0) * n;
         (apart + together(&of_rows) + together(&of_columns)) / (freedom * freedom)
     }
+}
+
+/// Σ x⁴.
+#[inline(always)]
+fn fourth_powers(values: &[f64]) -> f64 {
+    values.iter().map(|value| (value * value).powi(2)).sum()
 }
 
 /// So many photosites of a grid that reach the top are few.

@@ -20,7 +20,7 @@ pub use ends::{
     LEAST_VARIANCE, are_whole, below_saturation, cut_off, first_cut, full_mean, hot_share, is_clipped, may_be_largest,
     stuck_shares, without_clipped, without_stuck,
 };
-pub use weights::BEYOND_FIVE;
+pub use weights::{BEYOND_FIVE, relative_scatter};
 
 use super::fit::{Line, Point};
 use super::level::{Level, SAME_TIME, is_same_time};
@@ -91,6 +91,8 @@ pub struct Curve {
 #[derive(Debug, Clone, Default)]
 struct Weights {
     gain: Vec<f64>,
+    /// What points of the gain scatter by without what they miss their line by, variances.
+    own: Vec<f64>,
     response: Vec<f64>,
     dark_mean: Vec<f64>,
     dark_variance: Vec<f64>,
@@ -323,6 +325,13 @@ impl Curve {
         }
         let shortest = || self.darks.iter().filter_map(|dark| dark.exposure_s).reduce(f64::min);
         (self.times() < 3).then(shortest).filter(|time| *time != Some(0.0))
+    }
+
+    /// How many darks the dark noise is told by; none where the line through several exposure times, or through the flats, tells it.
+    pub fn frames_of_noise(&self) -> Option<f64> {
+        let time = |dark: &&Point4| dark.exposure_s.unwrap_or(f64::INFINITY);
+        let shortest = self.darks.iter().min_by(|a, b| time(a).total_cmp(&time(b))).map(|dark| dark.frames);
+        shortest.filter(|_| self.times() < 3 && self.tells_dark_noise())
     }
 
     /// Whether the temporal variance of darks is that of their noise.

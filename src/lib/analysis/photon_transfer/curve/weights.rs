@@ -14,7 +14,7 @@ impl Curve {
     pub(super) fn weigh(&mut self) {
         self.weigh_darks();
         let fitted: Vec<Point4> = self.fitted.iter().map(|&flat| self.flats[flat].clone()).collect();
-        let relative = relative_scatter(&fitted);
+        let relative = relative_scatter_of(&fitted);
         let parameters = if self.is_offset_free { 2 } else { 1 };
         let freedom = self.fitted.len().saturating_sub(parameters) as f64;
         let mut besides = 0.0;
@@ -48,6 +48,7 @@ impl Curve {
             let is_beyond = missed > freedom && significance::of_chi_square(missed, freedom) < BEYOND_FIVE;
             self.gain_error = is_beyond.then(|| (besides / largest).sqrt());
             self.weights.gain = own.iter().map(|own| weight(own, besides)).collect();
+            self.weights.own = own;
         }
         for &flat in &self.fitted {
             self.flats[flat].variance.variance += besides;
@@ -67,7 +68,7 @@ impl Curve {
             return;
         }
         // A variance that is low by chance does not count more.
-        let relative = relative_scatter(&self.darks);
+        let relative = relative_scatter_of(&self.darks);
         for _ in 0..2 {
             let Some([_, line]) = self.dark_lines() else { return };
             for (dark, weight) in self.darks.iter_mut().zip(&mut self.weights.dark_variance) {
@@ -217,11 +218,16 @@ fn told_off_line(misfit: f64, freedom: f64, besides: f64, cause: &str) -> Option
     })
 }
 
-/// Relative variance of a variance, times its freedom, over several levels: 2 of normal noise.
-fn relative_scatter(points: &[Point4]) -> f64 {
-    let all: f64 = points.iter().map(|point| point.freedom).sum();
-    let share =
-        |point: &Point4| point.freedom / all * point.freedom * point.variance.variance / point.variance.value.powi(2);
-    let pooled: f64 = points.iter().filter(|point| point.variance.value > 0.0).map(share).sum();
+/// Relative variance of a variance, times its freedom, over several levels: 2 of normal noise. Of each its freedom, the variance and what that
+/// scatters by, a variance.
+pub fn relative_scatter(levels: impl Iterator<Item = (f64, f64, f64)> + Clone) -> f64 {
+    let all: f64 = levels.clone().map(|(freedom, ..)| freedom).sum();
+    let share = |(freedom, value, scatter): (f64, f64, f64)| freedom / all * freedom * scatter / (value * value);
+    let pooled: f64 = levels.filter(|(_, value, _)| *value > 0.0).map(share).sum();
     if pooled > 0.0 { pooled } else { 2.0 }
+}
+
+/// The same of points.
+fn relative_scatter_of(points: &[Point4]) -> f64 {
+    relative_scatter(points.iter().map(|point| (point.freedom, point.variance.value, point.variance.variance)))
 }
