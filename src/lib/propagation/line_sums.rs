@@ -60,8 +60,8 @@ struct Shared {
 struct Class {
     /// What is a photosite's own, or other lines'.
     kinds: Kinds,
-    /// Few others.
-    few: Option<FewMeans>,
+    /// Few others, and their shares.
+    few: Vec<(f64, Law)>,
     /// What of that blurs codes, e⁻.
     blur_e: f64,
     expected_e: f64,
@@ -167,6 +167,10 @@ impl Shared {
         if self.offset_e == 0.0 && self.response == 0.0 {
             return Ok(());
         }
+        let few: Vec<Option<FewMeans>> = (0..self.classes.len()).map(|k| self.few_of(k)).collect();
+        if effort::is_spent() {
+            return Err(Unpredictable::Beyond(TAKES_LONG));
+        }
         let mut gains = self.gains(false)?;
         let smooth = nodes(self.offset_e, self.least_blur_e());
         let are_many = smooth.len() * gains.len() > MOST_NODES;
@@ -185,7 +189,7 @@ impl Shared {
         for (u, of_u) in gains {
             let share = 1.0 + self.response * u;
             let gained: Vec<Kinds> = self.classes.iter().map(|class| class.kinds.gained(share)).collect();
-            let line = self.line(&gained, share);
+            let line = self.line(&gained, &few, share);
             let offsets = if is_sharp { &self.offsets(&gained)? } else { &smooth };
             all += offsets.len();
             if all > MOST_STEPPED {
@@ -228,9 +232,6 @@ impl Shared {
                 let is_same =
                     |class: &Class| class.kinds == kinds && class.adc == adc && class.expected_e == expected_e;
                 let same = shared.classes.iter().position(is_same).unwrap_or(shared.classes.len());
-                let is_told = same == shared.classes.len();
-                let spreads = [shared.offset_e, shared.response];
-                let few = is_told.then(|| FewMeans::of(&few, kinds.most(), adc, spreads)).flatten();
                 let averaging = frames.map(|frames| Averaging::of(site, expected_e, part, anew_e, frames));
                 shared.classes.push(Class { kinds, few, blur_e, expected_e, adc, same, averaging });
             }
@@ -238,13 +239,22 @@ impl Shared {
         shared
     }
 
+    /// What few photosites of a class add to its means; none where another class is the same.
+    fn few_of(&self, index: usize) -> Option<FewMeans> {
+        let class = &self.classes[index];
+        let is_told = class.same == index && !effort::is_spent();
+        is_told
+            .then(|| FewMeans::of(&class.few, class.kinds.most(), class.adc, [self.offset_e, self.response]))
+            .flatten()
+    }
+
     /// The photosites of a line, by class, each about the center that the law of most has; none where another is the same.
-    fn line(&self, gained: &[Kinds], share: f64) -> Vec<Option<Means<'_>>> {
+    fn line(&self, gained: &[Kinds], few: &[Option<FewMeans>], share: f64) -> Vec<Option<Means<'_>>> {
         let means = |k: usize, class: &'_ Class| {
             let about = self.classes[k].kinds.most();
             match &self.classes[k].averaging {
                 None => {
-                    let few = class.few.map(|few| few.gained(share));
+                    let few = few[k].map(|few| few.gained(share));
                     Means::OfOne(Box::new(LineMeans::of(&gained[k], about, class.adc, class.blur_e).beside(few)))
                 }
                 Some(averaging) => Means::OfAverage(averaging.line(share, class.adc)),

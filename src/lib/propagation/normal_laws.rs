@@ -7,10 +7,13 @@
 //! half, five places leave 10⁻⁴.
 
 use super::counts::Charge;
+use super::masters::{Dark, Flat, MOST_DARKS};
 use super::memory::Memory;
 use super::node::{Law, Node};
+use super::photosite::Photosite;
 use crate::metadata::PoissonKind;
 use crate::numerics::gauss::{by_recurrence, hermite};
+use crate::stages::noise::{NoiseModel, Tails};
 use nalgebra::DMatrix;
 use std::sync::LazyLock;
 
@@ -94,6 +97,20 @@ impl Law {
             *law = (charge.mean + scale * place, weight);
         }
         Some(NormalLaws { std: (charge.variance - summed).sqrt(), laws })
+    }
+}
+
+impl Photosite {
+    /// The same of few photosites where these are no more than such a share of a frame.
+    pub(super) fn if_few(&self, share: f64) -> Self {
+        /// Of these, normal laws are good to 10⁻⁴ of what they have.
+        const FEW: f64 = 0.01;
+        let are_few = share <= FEW;
+        let of = |model: NoiseModel| NoiseModel { tails: Tails { are_few, ..model.tails }, ..model };
+        let of_dark = |dark: Dark| Dark { model: of(dark.model), ..dark };
+        let all = |darks: [Option<Dark>; MOST_DARKS]| darks.map(|dark| dark.map(of_dark));
+        let flat = self.flat.map(|flat| Flat { frames: of_dark(flat.frames), darks: all(flat.darks), ..flat });
+        Self { model: of(self.model), darks: all(self.darks), flat, ..*self }
     }
 }
 
@@ -225,7 +242,7 @@ mod tests {
     fn normal_laws_are_read_as_the_counts_that_they_stand_for() {
         for (light_e, dark_e, patterns, are_few) in [
             (2000.0, 5.0, [0.006, 0.1], false),
-            (4000.0, 300.0, [0.02, 0.01], false),
+            (4000.0, 300.0, [0.005, 0.01], false),
             (1000.0, 40.0, [0.0, 0.0], false),
             (40.0, 100.0, [0.01, 0.02], true),
             (500.0, 200.0, [0.005, 0.003], true),

@@ -156,18 +156,6 @@ impl Photosite {
         Self { model: self.model.at(state), darks: all(self.darks), flat, ..*self }
     }
 
-    /// The same of few photosites where these are no more than such a share of a frame.
-    fn if_few(&self, share: f64) -> Self {
-        /// Of these, normal laws are good to 10⁻⁴ of what they have.
-        const FEW: f64 = 0.01;
-        let are_few = share <= FEW;
-        let of = |model: NoiseModel| NoiseModel { tails: Tails { are_few, ..model.tails }, ..model };
-        let of_dark = |dark: Dark| Dark { model: of(dark.model), ..dark };
-        let all = |darks: [Option<Dark>; MOST_DARKS]| darks.map(|dark| dark.map(of_dark));
-        let flat = self.flat.map(|flat| Flat { frames: of_dark(flat.frames), darks: all(flat.darks), ..flat });
-        Self { model: of(self.model), darks: all(self.darks), flat, ..*self }
-    }
-
     /// That of the frames which have it.
     pub(super) fn most(&self, of: fn(&Tails) -> f64) -> f64 {
         self.models().map(|model| of(&model.tails)).fold(0.0, f64::max)
