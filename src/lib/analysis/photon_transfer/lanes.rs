@@ -38,22 +38,20 @@ pub fn depart(samples: &mut [f64], means: &[f64], above: &[f64], [of_columns, sq
     let (above, rest_above) = above.as_chunks::<LANES>();
     let (of_columns, rest_of_columns) = of_columns.as_chunks_mut::<LANES>();
     let (squares, rest_squares) = squares.as_chunks_mut::<LANES>();
-    let mut sums = [[0.0; LANES]; 3];
+    let [mut of_samples, mut of_products, mut of_squares] = [[0.0; LANES]; 3];
     let columns = of_columns.iter_mut().zip(squares);
     for (((samples, means), above), (of_columns, squares)) in samples.iter_mut().zip(means).zip(above).zip(columns) {
-        // Loaded whole, and stored whole, so that the lanes become a vector.
-        let (mut a, mut of_column, mut square) = (*samples, *of_columns, *squares);
-        for lane in 0..LANES {
-            a[lane] -= means[lane];
-            of_column[lane] += a[lane];
-            square[lane] += a[lane] * a[lane];
-            sums[0][lane] += a[lane];
-            sums[1][lane] += a[lane] * above[lane];
-            sums[2][lane] += a[lane] * a[lane];
-        }
-        (*samples, *of_columns, *squares) = (a, of_column, square);
+        // One step of all lanes after another, or compilers make short vectors of several steps.
+        let a = each(samples, means, |sample, mean| sample - mean);
+        let square = each(&a, &a, |a, b| a * b);
+        *of_columns = each(of_columns, &a, |sum, a| sum + a);
+        *squares = each(squares, &square, |sum, square| sum + square);
+        of_samples = each(&of_samples, &a, |sum, a| sum + a);
+        of_products = each(&of_products, &each(&a, above, |a, above| a * above), |sum, product| sum + product);
+        of_squares = each(&of_squares, &square, |sum, square| sum + square);
+        *samples = a;
     }
-    let mut totals = sums.map(|lanes| lanes.iter().sum::<f64>());
+    let mut totals = [of_samples, of_products, of_squares].map(|lanes| total(&lanes));
     for (index, sample) in rest.iter_mut().enumerate() {
         *sample -= rest_means[index];
         let a = *sample;
@@ -64,4 +62,20 @@ pub fn depart(samples: &mut [f64], means: &[f64], above: &[f64], [of_columns, sq
         totals[2] += a * a;
     }
     totals
+}
+
+/// The sum of lanes. Apart from the loop before it, or compilers make vectors across the sums and none of their lanes.
+#[inline(never)]
+fn total(lanes: &[f64; LANES]) -> f64 {
+    lanes.iter().sum()
+}
+
+/// What is made of each two lanes.
+#[inline(always)]
+fn each(a: &[f64; LANES], b: &[f64; LANES], of: impl Fn(f64, f64) -> f64) -> [f64; LANES] {
+    let mut made = [0.0; LANES];
+    for ((made, a), b) in made.iter_mut().zip(a).zip(b) {
+        *made = of(*a, *b);
+    }
+    made
 }

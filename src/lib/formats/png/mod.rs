@@ -1,5 +1,8 @@
 //! PNG: pictures of 8 or 16 bits, in which programs store their codes too \[PNG2025].
 
+mod codes;
+mod inflate;
+mod plain;
 mod read;
 mod write;
 
