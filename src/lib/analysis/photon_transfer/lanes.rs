@@ -64,6 +64,51 @@ pub fn depart(samples: &mut [f64], means: &[f64], above: &[f64], [of_columns, sq
     totals
 }
 
+/// Makes means of sums, which are multiplied by a share, and takes a center off, which is added to what columns have; gives Σ b and Σ b² of what
+/// is left.
+#[inline(always)]
+pub fn center(means: &mut [f64], above: &mut [f64], of_columns: &mut [f64], [share, center]: [f64; 2]) -> [f64; 2] {
+    let (means, rest) = means.as_chunks_mut::<LANES>();
+    let (above, rest_above) = above.as_chunks_mut::<LANES>();
+    let (of_columns, rest_of_columns) = of_columns.as_chunks_mut::<LANES>();
+    let [mut sums, mut squares] = [[0.0; LANES]; 2];
+    for ((means, above), of_columns) in means.iter_mut().zip(above).zip(of_columns) {
+        *means = each(means, &[share; LANES], |mean, share| mean * share);
+        let b = each(means, &[center; LANES], |mean, center| mean - center);
+        *of_columns = each(of_columns, &b, |sum, b| sum + b);
+        sums = each(&sums, &b, |sum, b| sum + b);
+        squares = each(&squares, &each(&b, &b, |a, b| a * b), |sum, square| sum + square);
+        *above = b;
+    }
+    for ((mean, above), of_column) in rest.iter_mut().zip(&mut *rest_above).zip(rest_of_columns) {
+        *mean *= share;
+        *above = *mean - center;
+        *of_column += *above;
+    }
+    let of_rest = [rest_above.iter().sum::<f64>(), rest_above.iter().map(|b| b * b).sum()];
+    let [sum, square] = [sums, squares].map(|lanes| total(&lanes));
+    [sum + of_rest[0], square + of_rest[1]]
+}
+
+/// Σ d² and Σ d⁴ of the differences of neighbors.
+#[inline(always)]
+pub fn steps(values: &[f64]) -> [f64; 2] {
+    let next = &values[1..];
+    let (whole, rest) = values[..next.len()].as_chunks::<LANES>();
+    let (whole_next, rest_next) = next.as_chunks::<LANES>();
+    let [mut squares, mut fourths] = [[0.0; LANES]; 2];
+    for (values, next) in whole.iter().zip(whole_next) {
+        let d = each(next, values, |next, value| next - value);
+        let square = each(&d, &d, |a, b| a * b);
+        squares = each(&squares, &square, |sum, square| sum + square);
+        fourths = each(&fourths, &each(&square, &square, |a, b| a * b), |sum, fourth| sum + fourth);
+    }
+    let of_rest = || rest.iter().zip(rest_next).map(|(value, next)| (next - value) * (next - value));
+    let [of_squares, of_fourths] = [of_rest().sum::<f64>(), of_rest().map(|square| square * square).sum()];
+    let [square, fourth] = [squares, fourths].map(|lanes| total(&lanes));
+    [square + of_squares, fourth + of_fourths]
+}
+
 /// The sum of lanes. Apart from the loop before it, or compilers make vectors across the sums and none of their lanes.
 #[inline(never)]
 fn total(lanes: &[f64; LANES]) -> f64 {

@@ -19,14 +19,18 @@ const PADDING: usize = 16;
 /// No header of a block has more bytes.
 const HEADER: usize = 1 << 10;
 
+/// Bytes that a source has room for.
+pub const ROOM: usize = (32 << 10) + 16;
+const INPUT: usize = ROOM + HEADER + 8 + PADDING;
+
 /// What is no stream, or ends too early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Damaged;
 
 /// Where compressed bytes come from.
 pub trait Source {
-    /// Appends the next bytes, a few tens of KiB at most; none where there are no more.
-    fn more(&mut self, bytes: &mut Vec<u8>) -> Result<(), Damaged>;
+    /// Gives some of the next bytes in place of the first of `room`, which has [`ROOM`] at least, and tells how many; none where there are no more.
+    fn more(&mut self, room: &mut [u8]) -> Result<usize, Damaged>;
 }
 
 /// Where in its stream it is.
@@ -42,7 +46,9 @@ enum Place {
 
 /// A stream that is being inflated.
 pub struct Inflate {
-    input: Vec<u8>,
+    input: Box<[u8; INPUT]>,
+    /// So many bytes of the input are there, with zeros behind the last.
+    there: usize,
     /// The byte of the input that is fetched next.
     at: usize,
     /// Whether no input is to come, and zeros stand behind it.
@@ -65,7 +71,8 @@ pub struct Inflate {
 impl Inflate {
     pub fn new() -> Self {
         Self {
-            input: Vec::new(),
+            input: Box::new([0; INPUT]),
+            there: 0,
             at: 0,
             is_all: false,
             bits: 0,
@@ -83,8 +90,7 @@ impl Inflate {
 
     /// Makes ready for another stream.
     pub fn begin(&mut self) {
-        self.input.clear();
-        (self.at, self.is_all, self.bits, self.count) = (0, false, 0, 0);
+        (self.there, self.at, self.is_all, self.bits, self.count) = (0, 0, false, 0, 0);
         (self.place, self.has_begun, self.is_last) = (Place::Header, false, false);
         (self.start, self.end, self.taken) = (WINDOW, WINDOW, WINDOW);
     }
@@ -120,7 +126,7 @@ impl Inflate {
             (self.end, self.taken) = (WINDOW, WINDOW);
         }
         while self.end < WINDOW + PIECE && self.place != Place::End {
-            if self.at + PADDING > self.input.len() {
+            if self.at + PADDING > self.there {
                 self.fill(PADDING, source)?;
             }
             match self.place {
@@ -130,7 +136,7 @@ impl Inflate {
                 Place::End => {}
             }
             // Zeros behind the end are no part of it.
-            if self.is_all && self.at - self.count as usize / 8 > self.input.len() - PADDING {
+            if self.is_all && self.at - self.count as usize / 8 > self.there - PADDING {
                 return Err(Damaged);
             }
         }
@@ -139,15 +145,17 @@ impl Inflate {
 
     /// Has so many bytes of input at hand, or all there are.
     fn fill(&mut self, least: usize, source: &mut impl Source) -> Result<(), Damaged> {
-        while self.at + least > self.input.len() && !self.is_all {
+        while self.at + least > self.there && !self.is_all {
             // Bytes of which bits were fetched that may go back stay.
-            self.input.drain(..self.at.saturating_sub(8));
-            self.at = self.at.min(8);
-            let before = self.input.len();
-            source.more(&mut self.input)?;
-            if self.input.len() == before {
+            let gone = self.at.saturating_sub(8);
+            self.input.copy_within(gone..self.there, 0);
+            (self.at, self.there) = (self.at - gone, self.there - gone);
+            let more = source.more(&mut self.input[self.there..])?;
+            self.there += more;
+            if more == 0 {
                 self.is_all = true;
-                self.input.resize(before + PADDING, 0);
+                self.input[self.there..self.there + PADDING].fill(0);
+                self.there += PADDING;
             }
         }
         Ok(())
@@ -156,7 +164,7 @@ impl Inflate {
     /// Has 56 bits at hand.
     fn fetch(&mut self) {
         while self.count < 56 {
-            let byte = self.input.get(self.at).copied().unwrap_or_default();
+            let byte = self.input[..self.there].get(self.at).copied().unwrap_or_default();
             self.bits |= u64::from(byte) << self.count;
             self.count += 8;
             self.at += 1;
@@ -256,7 +264,7 @@ impl Inflate {
             self.place = Place::Header;
             return Ok(());
         }
-        let there = self.input.len() - if self.is_all { PADDING } else { 0 };
+        let there = self.there - if self.is_all { PADDING } else { 0 };
         let count = left.min(there.saturating_sub(self.at)).min(WINDOW + PIECE - self.end);
         if count == 0 {
             return Err(Damaged);
@@ -270,7 +278,8 @@ impl Inflate {
 
     /// Decodes by the codes of the block, as long as there are input and room.
     fn steps(&mut self) -> Result<(), Damaged> {
-        let Self { input, output, tables, is_all, .. } = self;
+        let Self { input, output, tables, is_all, there, .. } = self;
+        let input = &input[..*there];
         let last = input.len().saturating_sub(if *is_all { 8 } else { PADDING });
         let mut at = self.at;
         let mut run = Run { bits: self.bits, count: self.count, start: self.start, end: self.end };
@@ -369,10 +378,13 @@ fn too_far(length: usize) -> Result<(), Damaged> {
     if length > 0 { Err(Damaged) } else { Ok(()) }
 }
 
+/// Writes the last `back` bytes again and again, fewer than are copied at once.
 #[inline(never)]
 fn repeat(output: &mut [u8; OUTPUT], end: usize, back: usize, length: usize) {
-    for place in end..end + length {
-        output[place] = output[place - back];
+    let bytes: [u8; COPY] = std::array::from_fn(|at| output[end - back + at % back]);
+    let whole = COPY - COPY % back;
+    for done in (0..length).step_by(whole) {
+        output[end + done..end + done + COPY].copy_from_slice(&bytes);
     }
 }
 
@@ -394,11 +406,11 @@ mod tests {
     struct Pieces<'a>(&'a [u8], usize);
 
     impl Source for Pieces<'_> {
-        fn more(&mut self, bytes: &mut Vec<u8>) -> Result<(), Damaged> {
+        fn more(&mut self, room: &mut [u8]) -> Result<usize, Damaged> {
             let (now, later) = self.0.split_at(self.1.min(self.0.len()));
-            bytes.extend_from_slice(now);
+            room[..now.len()].copy_from_slice(now);
             self.0 = later;
-            Ok(())
+            Ok(now.len())
         }
     }
 

@@ -3,7 +3,7 @@
 //! What is out of the ordinary, damage above all, is left to the crate `png`, which begins again and says what is wrong. So whatever is
 //! read here must be whole: all that the crate holds against a file is held against it here too.
 
-use super::inflate::{Damaged, Inflate, Source};
+use super::inflate::{Damaged, Inflate, ROOM, Source};
 use crate::numerics::vectors::{self, Kernel};
 use flate2::Crc;
 use std::fs::File;
@@ -11,8 +11,6 @@ use std::mem;
 use std::os::unix::fs::FileExt;
 use std::sync::{Mutex, PoisonError};
 
-/// Compressed bytes that are read at once.
-const READ_BYTES: usize = 32 << 10;
 /// The checksum of a chunk, and the length and kind of the next.
 const BETWEEN: usize = 12;
 /// Inflaters that are kept for the next files, about 130 KiB each.
@@ -61,14 +59,8 @@ impl PlainRows {
             return Ok(());
         }
         // Checksums of what nobody needs count too.
-        let mut passed = Vec::new();
-        loop {
-            source.more(&mut passed)?;
-            if passed.is_empty() {
-                break;
-            }
-            passed.clear();
-        }
+        let mut passed = vec![0; ROOM];
+        while source.more(&mut passed)? > 0 {}
         let mut kept = KEPT_INFLATERS.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.len() < KEPT {
             kept.push(inflate);
@@ -102,18 +94,17 @@ struct Data<'a> {
 }
 
 impl Source for Data<'_> {
-    fn more(&mut self, bytes: &mut Vec<u8>) -> Result<(), Damaged> {
+    fn more(&mut self, room: &mut [u8]) -> Result<usize, Damaged> {
         let Self { file, chunks } = self;
-        let before = bytes.len();
-        while bytes.len() == before && !chunks.is_last {
-            let count = usize::try_from(chunks.left).unwrap_or(usize::MAX).min(READ_BYTES);
+        let mut read = 0;
+        while read == 0 && !chunks.is_last {
+            let count = usize::try_from(chunks.left).unwrap_or(usize::MAX).min(ROOM - BETWEEN);
             let is_end = count as u64 == chunks.left;
             let wanted = count + if is_end { BETWEEN } else { 0 };
-            bytes.resize(before + wanted, 0);
-            file.read_exact_at(&mut bytes[before..], chunks.place).map_err(|_| Damaged)?;
+            file.read_exact_at(&mut room[..wanted], chunks.place).map_err(|_| Damaged)?;
             chunks.place += wanted as u64;
             chunks.left -= count as u64;
-            let (data, behind) = bytes[before..].split_at(count);
+            let (data, behind) = room[..wanted].split_at(count);
             chunks.sum.update(data);
             if is_end {
                 let behind: [u8; BETWEEN] = behind.try_into().map_err(|_| Damaged)?;
@@ -125,10 +116,10 @@ impl Source for Data<'_> {
                 chunks.is_last = kind.to_be_bytes() != *b"IDAT";
                 chunks.left = length.into();
                 chunks.sum = crc_of_data();
-                bytes.truncate(before + count);
             }
+            read = count;
         }
-        Ok(())
+        Ok(read)
     }
 }
 
