@@ -3,14 +3,16 @@
 
 use super::inflate::Damaged;
 
-/// Bits that tables are entered with: more would take the place of samples in the nearest cache.
+/// Bits that the table of steps is entered with: more would take the place of what is inflated in the nearest cache.
 pub const STEP_BITS: u32 = 11;
+/// Bits that those of single symbols are.
 const SYMBOL_BITS: u32 = 10;
 const DISTANCE_BITS: u32 = 9;
 /// Bits of the longest code.
 pub const LONGEST: usize = 15;
-/// Symbols of literals and lengths, and of distances.
+/// Symbols of literals and lengths.
 pub const LITERALS: usize = 288;
+/// Symbols of distances.
 pub const DISTANCES: usize = 32;
 /// What ends a block.
 pub const END: usize = 256;
@@ -44,6 +46,7 @@ pub struct Codes {
 }
 
 impl Codes {
+    /// Of no symbol.
     pub const NONE: Self = Self { counts: [0; LONGEST + 1], symbols: [0; LITERALS] };
 
     /// Takes the lengths of the codes of all symbols; gives how many bit patterns of [`LONGEST`] bits begin with no code.
@@ -131,6 +134,7 @@ impl Step {
         Self(u64::from(code_bits + extra) | u64::from(code_bits) << 8 | u64::from(least) << 16 | (length as u64) << 32)
     }
 
+    /// Whether it takes more bits than the table is entered with.
     #[inline(always)]
     pub fn takes_more(self) -> bool {
         self.0 & Self::MORE.0 != 0
@@ -174,6 +178,7 @@ impl Distance {
 
 /// The codes of a block.
 pub struct Tables {
+    /// What is to be done by the next bits.
     pub steps: Box<[Step; 1 << STEP_BITS]>,
     /// Symbols of literals and lengths, and from bit 16 on the bits of their codes; 0 where these have more.
     symbols: Box<[u32; 1 << SYMBOL_BITS]>,
@@ -183,6 +188,7 @@ pub struct Tables {
 }
 
 impl Tables {
+    /// Of no code.
     pub fn new() -> Self {
         Self {
             steps: Box::new([Step::MORE; 1 << STEP_BITS]),

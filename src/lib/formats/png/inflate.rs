@@ -30,6 +30,10 @@ pub struct Damaged;
 /// Where compressed bytes come from.
 pub trait Source {
     /// Gives some of the next bytes in place of the first of `room`, which has [`ROOM`] at least, and tells how many; none where there are no more.
+    ///
+    /// # Errors
+    ///
+    /// Where they cannot be had, or are damaged.
     fn more(&mut self, room: &mut [u8]) -> Result<usize, Damaged>;
 }
 
@@ -69,6 +73,7 @@ pub struct Inflate {
 }
 
 impl Inflate {
+    /// Ready for a stream.
     pub fn new() -> Self {
         Self {
             input: Box::new([0; INPUT]),
@@ -381,7 +386,11 @@ fn too_far(length: usize) -> Result<(), Damaged> {
 /// Writes the last `back` bytes again and again, fewer than are copied at once.
 #[inline(never)]
 fn repeat(output: &mut [u8; OUTPUT], end: usize, back: usize, length: usize) {
-    let bytes: [u8; COPY] = std::array::from_fn(|at| output[end - back + at % back]);
+    let mut bytes = [0; COPY];
+    bytes[..back].copy_from_slice(&output[end - back..end]);
+    for at in back..COPY {
+        bytes[at] = bytes[at - back];
+    }
     let whole = COPY - COPY % back;
     for done in (0..length).step_by(whole) {
         output[end + done..end + done + COPY].copy_from_slice(&bytes);
@@ -437,7 +446,7 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 33) as u32
         };
-        (0..count).map(|_| (draw() % values >> if is_even { 0 } else { draw() % 8 }) as u8).collect()
+        (0..count).map(|_| ((draw() % values) >> if is_even { 0 } else { draw() % 8 }) as u8).collect()
     }
 
     #[test]
@@ -445,7 +454,7 @@ mod tests {
         // A match can be of the distance 32768, and of 1, which repeats a byte.
         let far = [noise(32_768, 256, true), noise(32_768, 256, true), vec![7; 5000]].concat();
         let words: Vec<u8> =
-            (0..60_000_u32).flat_map(|word| [(word * word >> 9) as u8, 0, (word >> 12) as u8]).collect();
+            (0..60_000_u32).flat_map(|word| [((word * word) >> 9) as u8, 0, (word >> 12) as u8]).collect();
         let all = [noise(200_000, 40, false), noise(70_000, 256, true), noise(300_000, 3, true), far, words, vec![5]];
         for (which, bytes) in all.iter().enumerate() {
             for level in 0..=9 {

@@ -16,13 +16,13 @@ const BETWEEN: usize = 12;
 /// Inflaters that are kept for the next files, about 130 KiB each.
 const KEPT: usize = 64;
 
-static KEPT_INFLATERS: Mutex<Vec<Box<Inflate>>> = Mutex::new(Vec::new());
+static KEPT_INFLATERS: Mutex<Vec<Inflate>> = Mutex::new(Vec::new());
 
 /// Reads rows of 8 or 16 bits.
 pub struct PlainRows {
     chunks: Chunks,
     /// None once all rows are read.
-    inflate: Option<Box<Inflate>>,
+    inflate: Option<Inflate>,
     /// The row and that above it, behind a byte that names the filter of the row.
     row: Vec<u8>,
     above: Vec<u8>,
@@ -70,9 +70,9 @@ impl PlainRows {
 }
 
 /// One that is kept, or another.
-fn inflater() -> Box<Inflate> {
+fn inflater() -> Inflate {
     let kept = KEPT_INFLATERS.lock().unwrap_or_else(PoisonError::into_inner).pop();
-    let mut inflate = kept.unwrap_or_else(|| Box::new(Inflate::new()));
+    let mut inflate = kept.unwrap_or_else(Inflate::new);
     inflate.begin();
     inflate
 }

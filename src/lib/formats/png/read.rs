@@ -64,7 +64,7 @@ pub struct PngReader {
 
 /// Who reads rows.
 enum Rows {
-    Plain(PlainRows),
+    Plain(Box<PlainRows>),
     /// The crate, which reads all there are, and says what is wrong with them.
     Any(Box<png::Reader<BufReader<File>>>),
 }
@@ -114,7 +114,7 @@ impl PngReader {
         let is_plain = channels.len() == 1 && reader.info().animation_control.is_none();
         let rows = match before.filter(|_| is_plain) {
             Some(Before { data, .. }) => {
-                Rows::Plain(PlainRows::new([width, height], stored.bytes(), data.data, data.length))
+                Rows::Plain(Box::new(PlainRows::new([width, height], stored.bytes(), data.data, data.length)))
             }
             None => Rows::Any(Box::new(begin(&file, start, name, READ_BYTES)?.read_info().map_err(damage)?)),
         };
