@@ -1,7 +1,9 @@
 //! Codes of Deflate, and tables that tell by the next bits what is to be done \[RFC1951, Sec. 3.2].
 #![expect(clippy::cast_possible_truncation, reason = "fields of a few bits")]
 
-use super::inflate::Damaged;
+/// What is no stream, or ends too early.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Damaged;
 
 /// Bits that the table of steps is entered with: more would take the place of what is inflated in the nearest cache.
 pub const STEP_BITS: u32 = 11;

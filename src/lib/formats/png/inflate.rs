@@ -3,7 +3,7 @@
 //! What is no such stream to the letter is left to the crate `png`, which knows what to say of it.
 #![expect(clippy::cast_possible_truncation, reason = "fields of a few bits")]
 
-use super::codes::{Codes, DISTANCES, END, LITERALS, STEP_BITS, Step, Tables, length};
+use super::codes::{Codes, DISTANCES, Damaged, END, LITERALS, STEP_BITS, Step, Tables, length};
 
 /// How many bytes back a match may reach.
 const WINDOW: usize = 1 << 15;
@@ -22,10 +22,6 @@ const HEADER: usize = 1 << 10;
 /// Bytes that a source has room for.
 pub const ROOM: usize = (32 << 10) + 16;
 const INPUT: usize = ROOM + HEADER + 8 + PADDING;
-
-/// What is no stream, or ends too early.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Damaged;
 
 /// Where compressed bytes come from.
 pub trait Source {

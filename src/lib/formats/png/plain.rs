@@ -3,7 +3,8 @@
 //! What is out of the ordinary, damage above all, is left to the crate `png`, which begins again and says what is wrong. So whatever is
 //! read here must be whole: all that the crate holds against a file is held against it here too.
 
-use super::inflate::{Damaged, Inflate, ROOM, Source};
+use super::codes::Damaged;
+use super::inflate::{Inflate, ROOM, Source};
 use crate::numerics::vectors::{self, Kernel};
 use flate2::Crc;
 use std::fs::File;
