@@ -1,7 +1,7 @@
 //! Reading rows.
 
-use super::PLACE;
 use super::plain::PlainRows;
+use super::{DEFLATE_EXPANSION, PLACE};
 use crate::color::rgb::{Encoding, NamedPrimaries};
 use crate::error::{Error, Result};
 use crate::formats::exposure::ToldExposure;
@@ -36,15 +36,13 @@ const METADATA_BYTES: usize = 1 << 20;
 /// What a row may take however small the file is; if more, then so many times what the file has.
 const SMALL_BYTES: u64 = 64 << 20;
 const MOST_EXPANSION: u64 = 64;
-/// How many bytes one byte of Deflate can become at most: a match of 258 in two bits.
-const DEFLATE_EXPANSION: u64 = 1032;
 
 const CONVERT: &str = "convert it first, for example with `oiiotool in.png -o out.tif`";
 
 /// Reads the rows of a PNG.
 ///
 /// Channels are `Y`; `Y`, `A`; `R`, `G`, `B`; with `A`. Samples are those stored: a transfer function is not undone, alpha
-/// is not divided by. Memory is a few rows, and texts of up to 16 MiB.
+/// is not divided by. Memory is a few rows, and texts of up to 16 MiB; of a plain picture, where it is not large, it is all of it.
 pub struct PngReader {
     name: String,
     /// The file once more, and where it begins in there.
@@ -114,7 +112,8 @@ impl PngReader {
         let is_plain = channels.len() == 1 && reader.info().animation_control.is_none();
         let rows = match before.filter(|_| is_plain) {
             Some(Before { data, .. }) => {
-                Rows::Plain(Box::new(PlainRows::new([width, height], stored.bytes(), data.data, data.length)))
+                let place = data.data..start + length;
+                Rows::Plain(Box::new(PlainRows::new([width, height], stored.bytes(), place, data.length)))
             }
             None => Rows::Any(Box::new(begin(&file, start, name, READ_BYTES)?.read_info().map_err(damage)?)),
         };
@@ -593,21 +592,34 @@ mod tests {
 
     /// A gray picture 23 wide of so many rows, of chunks of so many bytes of data; a row is filtered by the filters in turn.
     fn gray(depth: BitDepth, rows: u32, level: u32, chunk_bytes: usize) -> Vec<u8> {
-        use flate2::{Compression, write::ZlibEncoder};
+        of_data([23, rows], depth, &packed(&filtered(depth, rows), level), chunk_bytes)
+    }
+
+    fn filtered(depth: BitDepth, rows: u32) -> Vec<u8> {
         let row_bytes = 23 * depth as usize / 8;
         let mut state = 1_u64;
-        let mut filtered = ZlibEncoder::new(Vec::new(), Compression::new(level));
+        let mut bytes = Vec::new();
         for row in 0..rows {
             // Filters of noise are as good as noise: whatever the bytes are, they are some picture, filtered.
-            let mut bytes = vec![u8::try_from(row % 5).unwrap()];
+            bytes.push(u8::try_from(row % 5).unwrap());
             for _ in 0..row_bytes {
                 state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 bytes.push((state >> 59).to_le_bytes()[0] * 8);
             }
-            filtered.write_all(&bytes).unwrap();
         }
-        let data = filtered.finish().unwrap();
-        let header = [&23_u32.to_be_bytes()[..], &rows.to_be_bytes(), &[depth as u8, 0, 0, 0, 0]].concat();
+        bytes
+    }
+
+    fn packed(bytes: &[u8], level: u32) -> Vec<u8> {
+        use flate2::{Compression, write::ZlibEncoder};
+        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(level));
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    }
+
+    /// A gray picture of such data, an empty chunk before.
+    fn of_data([width, height]: [u32; 2], depth: BitDepth, data: &[u8], chunk_bytes: usize) -> Vec<u8> {
+        let header = [&width.to_be_bytes()[..], &height.to_be_bytes(), &[depth as u8, 0, 0, 0, 0]].concat();
         let mut bytes = [b"\x89PNG\r\n\x1A\n".to_vec(), chunk(b"IHDR", &header), chunk(b"IDAT", &[])].concat();
         data.chunks(chunk_bytes).for_each(|data| bytes.extend(chunk(b"IDAT", data)));
         bytes.extend(chunk(b"IEND", &[]));
@@ -645,6 +657,42 @@ mod tests {
                 same(&with_sums(&changed), &format!("byte {at} with its checksum"));
                 same(&whole[..at], &format!("cut to {at}"));
             }
+        }
+    }
+
+    /// Bytes behind the stream, rows behind the picture and none for the last, another sum behind the stream or none.
+    #[test]
+    fn streams_of_another_length_are_what_the_crate_takes_them_for() {
+        let rows = filtered(BitDepth::Eight, 31);
+        let stream = packed(&rows, 6);
+        let end = stream.len() - 4;
+        let longer = packed(&[&rows[..], &[3; 24]].concat(), 6);
+        let shorter = packed(&rows[..30 * 24], 6);
+        let sum = [&stream[..end], &[1, 2, 3, 4]].concat();
+        let streams = [[&stream[..], &[7; 50]].concat(), longer, shorter, sum, stream[..end].to_vec()];
+        for (which, data) in streams.iter().enumerate() {
+            for chunk_bytes in [50, 1 << 20] {
+                let bytes = of_data([23, 31], BitDepth::Eight, data, chunk_bytes);
+                assert_eq!(all_rows(opened(&bytes, 0)), all_rows_of_crate(&bytes), "{which} {chunk_bytes}");
+            }
+        }
+        // A header that says more than the data can be is not believed where other chunks make the file long.
+        let mut bytes = of_data([23, 40_000], BitDepth::Eight, &packed(&rows[..48], 6), 1 << 20);
+        bytes.extend(chunk(b"teXt", &[b'a'; 2000]));
+        assert_eq!(all_rows(opened(&bytes, 0)), all_rows_of_crate(&bytes));
+    }
+
+    /// What takes more than 64 MiB is left to the crate, which streams it.
+    #[test]
+    fn large_pictures_are_streamed() {
+        for (height, is_plain) in [(63, true), (64, false)] {
+            let rows = vec![0; height * ((1 << 20) + 1)];
+            let size = [1 << 20, u32::try_from(height).unwrap()];
+            let mut reader = opened(&of_data(size, BitDepth::Eight, &packed(&rows, 1), 1 << 20), 0).unwrap();
+            let mut samples = Vec::new();
+            reader.read(1, &mut samples).unwrap();
+            assert!(samples.len() == 1 << 20 && samples.iter().all(|sample| *sample == 0.0));
+            assert_eq!(matches!(reader.rows, Rows::Plain(_)), is_plain);
         }
     }
 
