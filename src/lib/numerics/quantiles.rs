@@ -3,6 +3,9 @@
 use statrs::function::beta::checked_beta_reg;
 use statrs::function::erf::erf_inv;
 use statrs::function::gamma::checked_gamma_lr;
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::thread::LocalKey;
 
 /// The standard normal deviate that a share `p` lies below, 0 < p < 1.
 pub fn of_normal(p: f64) -> f64 {
@@ -20,17 +23,19 @@ pub fn of_chi_square(p: f64, freedom: f64) -> f64 {
     if freedom >= MANY {
         return near;
     }
-    let below = |x: f64| checked_gamma_lr(freedom / 2.0, x / 2.0).unwrap_or(1.0);
-    let (mut low, mut high) = (0.0, near.max(1.0));
-    while below(high) < p {
-        high *= 2.0;
-    }
-    // Doubles have 53 bits.
-    for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        if below(middle) < p { low = middle } else { high = middle }
-    }
-    f64::midpoint(low, high)
+    remembered(&CHI_SQUARES, [p, freedom], || {
+        let below = |x: f64| checked_gamma_lr(freedom / 2.0, x / 2.0).unwrap_or(1.0);
+        let (mut low, mut high) = (0.0, near.max(1.0));
+        while below(high) < p {
+            high *= 2.0;
+        }
+        // Doubles have 53 bits.
+        for _ in 0..60 {
+            let middle = f64::midpoint(low, high);
+            if below(middle) < p { low = middle } else { high = middle }
+        }
+        f64::midpoint(low, high)
+    })
 }
 
 /// The deviate of Student's law of `freedom` degrees of freedom, whole or not, that a share `p` lies below, ½ ≤ p < 1, by bisection of
@@ -41,17 +46,42 @@ pub fn of_student(p: f64, freedom: f64) -> f64 {
     if freedom >= MANY {
         return of_normal(p);
     }
-    let above = |t: f64| 0.5 * checked_beta_reg(freedom / 2.0, 0.5, freedom / (freedom + t * t)).unwrap_or(0.0);
-    let (mut low, mut high) = (0.0, 1.0);
-    while above(high) > 1.0 - p && high < f64::MAX {
-        high *= 2.0;
-    }
-    // Doubles have 53 bits.
-    for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        if above(middle) > 1.0 - p { low = middle } else { high = middle }
-    }
-    f64::midpoint(low, high)
+    remembered(&DEVIATES, [p, freedom], || {
+        let above = |t: f64| 0.5 * checked_beta_reg(freedom / 2.0, 0.5, freedom / (freedom + t * t)).unwrap_or(0.0);
+        let (mut low, mut high) = (0.0, 1.0);
+        while above(high) > 1.0 - p && high < f64::MAX {
+            high *= 2.0;
+        }
+        // Doubles have 53 bits.
+        for _ in 0..60 {
+            let middle = f64::midpoint(low, high);
+            if above(middle) > 1.0 - p { low = middle } else { high = middle }
+        }
+        f64::midpoint(low, high)
+    })
+}
+
+/// What was asked last, with what came of it.
+type Last = RefCell<VecDeque<([u64; 2], f64)>>;
+
+thread_local! {
+    static CHI_SQUARES: Last = const { RefCell::new(VecDeque::new()) };
+    static DEVIATES: Last = const { RefCell::new(VecDeque::new()) };
+}
+
+/// What is asked, or was a short while ago: the levels of a measurement have few unlike degrees of freedom among them.
+fn remembered(last: &'static LocalKey<Last>, asked: [f64; 2], find: impl FnOnce() -> f64) -> f64 {
+    const MOST: usize = 8;
+    let asked = asked.map(f64::to_bits);
+    last.with_borrow_mut(|last| {
+        if let Some((_, found)) = last.iter().find(|(of, _)| *of == asked) {
+            return *found;
+        }
+        let found = find();
+        last.truncate(MOST - 1);
+        last.push_front((asked, found));
+        found
+    })
 }
 
 #[cfg(test)]
@@ -84,6 +114,18 @@ mod tests {
         for p in [0.001, 0.025, 0.5, 0.975, 0.999] {
             let [few, many] = [MANY - 1e-9, MANY].map(|freedom| of_chi_square(p, freedom));
             assert!((few / many - 1.0).abs() < 1e-4, "{p}: {few} {many}");
+        }
+    }
+
+    /// Among many that are asked in turn each is what it is when it is asked alone.
+    #[test]
+    fn what_was_asked_before_is_no_matter() {
+        let asked: Vec<[f64; 2]> = (0..40).map(|at| [0.6 + 0.01 * f64::from(at % 5), f64::from(at % 11 + 1)]).collect();
+        let both = |[p, freedom]: [f64; 2]| [of_chi_square(p, freedom), of_student(p, freedom)].map(f64::to_bits);
+        let in_turn: Vec<_> = asked.iter().map(|asked| both(*asked)).collect();
+        for (asked, found) in asked.into_iter().zip(in_turn) {
+            let alone = std::thread::spawn(move || both(asked)).join().unwrap();
+            assert_eq!(alone, found);
         }
     }
 }

@@ -66,29 +66,34 @@ impl FallingSums {
     pub fn add(&mut self, squares: &[f64], means: &[f64]) {
         let (whole, rest) = squares.as_chunks::<BLOCK>();
         let (whole_means, rest_means) = means.as_chunks::<BLOCK>();
+        let mut spread = [0.0; BLOCK];
         for (squares, means) in whole.iter().zip(whole_means) {
-            self.note(squares, means);
+            let of_means = block_sum(*means) / BLOCK as f64;
+            let mut products = [0.0; BLOCK];
+            for lane in 0..BLOCK {
+                let off = means[lane] - of_means;
+                // What is off adds up to 0, so that the mean of the squares takes nothing off.
+                products[lane] = squares[lane] * off;
+                spread[lane] += off * off;
+            }
+            self.note(block_sum(products));
         }
+        self.spread += block_sum(spread);
+        self.freedom += whole.len() as f64 * (BLOCK as f64 - 1.0);
         if rest.len() > 1 {
-            self.note(rest, rest_means);
+            let of_means = rest_means.iter().sum::<f64>() / rest.len() as f64;
+            self.note(rest.iter().zip(rest_means).map(|(square, mean)| square * (mean - of_means)).sum());
+            self.spread += rest_means.iter().map(|mean| (mean - of_means) * (mean - of_means)).sum::<f64>();
+            self.freedom += rest.len() as f64 - 1.0;
         }
     }
 
+    /// Adds the product of a block.
     #[inline(always)]
-    fn note(&mut self, squares: &[f64], means: &[f64]) {
-        let share = 1.0 / means.len() as f64;
-        let [of_squares, of_means] = [squares, means].map(|values| values.iter().sum::<f64>() * share);
-        let (mut product, mut spread) = (0.0, 0.0);
-        for (square, mean) in squares.iter().zip(means) {
-            let off = mean - of_means;
-            product += (square - of_squares) * off;
-            spread += off * off;
-        }
+    fn note(&mut self, product: f64) {
         self.products[0] += 1.0;
         self.products[1] += product;
         self.products[2] += product * product;
-        self.spread += spread;
-        self.freedom += means.len() as f64 - 1.0;
     }
 
     /// What they tell of so many frames, of which `times` as many squares are to be counted as were.
@@ -103,6 +108,14 @@ impl FallingSums {
             freedom: self.freedom,
         }
     }
+}
+
+/// The sum of a block, by halves, which compilers make vectors of.
+#[inline(always)]
+fn block_sum([a, b, c, d, e, f, g, h]: [f64; BLOCK]) -> f64 {
+    let [a, b, c, d] = [a + e, b + f, c + g, d + h];
+    let [a, b] = [a + c, b + d];
+    a + b
 }
 
 #[cfg(test)]

@@ -5,6 +5,9 @@ const ROWS: usize = 64;
 /// So many samples that differ from frame to frame: chance makes no two frames alike then.
 const ENOUGH: u64 = 24;
 
+/// Frames whose numbers are made side by side.
+const TOGETHER: usize = 4;
+
 /// What tells a frame from all others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Print(u64);
@@ -35,18 +38,28 @@ impl Prints {
         if y == 0 {
             self.first = bands.iter().map(|band| band[place.start]).collect();
         }
-        let base = &bands[0][place.clone()];
-        for (index, band) in bands.iter().enumerate() {
-            let (first, mut print) = (self.first[index], self.prints[index]);
-            for sample in &band[place.clone()] {
-                print = (print ^ u64::from((sample - first + 0.0).to_bits()))
-                    .wrapping_mul(0x0000_0100_0000_01B3)
-                    .rotate_left(5);
+        let row = |frame: usize| &bands[frame][place.clone()];
+        // Of several frames at once, as each number of one waits for that before it.
+        for first in (0..bands.len()).step_by(TOGETHER) {
+            let own = &mut self.prints[first..bands.len().min(first + TOGETHER)];
+            let rows: [_; TOGETHER] = std::array::from_fn(|frame| {
+                let frame = first + frame.min(own.len() - 1);
+                (row(frame), self.first[frame])
+            });
+            let mut prints = [0; TOGETHER];
+            prints[..own.len()].copy_from_slice(own);
+            for x in 0..place.len() {
+                for (print, (samples, first)) in prints.iter_mut().zip(rows) {
+                    *print = (*print ^ u64::from((samples[x] - first + 0.0).to_bits()))
+                        .wrapping_mul(0x0000_0100_0000_01B3)
+                        .rotate_left(5);
+                }
             }
-            self.prints[index] = print;
-            let [own, of_base] = [first, self.first[0]];
-            let is_apart = |(sample, other): (&f32, &f32)| sample - own != other - of_base;
-            self.apart += band[place.clone()].iter().zip(base).map(|two| u64::from(is_apart(two))).sum::<u64>();
+            own.copy_from_slice(&prints[..own.len()]);
+        }
+        for (frame, own) in self.first.iter().enumerate() {
+            let is_apart = |(sample, other): (&f32, &f32)| sample - own != other - self.first[0];
+            self.apart += row(frame).iter().zip(row(0)).map(|two| u64::from(is_apart(two))).sum::<u64>();
         }
     }
 

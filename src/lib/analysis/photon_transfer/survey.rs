@@ -21,8 +21,10 @@ use super::tally::Tally;
 use crate::error::{Error, Result};
 use crate::frame::Geometry;
 use crate::metadata::FrameHeader;
+use crate::numerics::vectors::{self, Kernel};
 use crate::stream::RowSource;
 use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 
 /// What frames of one condition tell.
 #[derive(Debug, Clone)]
@@ -110,9 +112,17 @@ struct Band {
     marks: Vec<Vec<f32>>,
 }
 
+/// Buffers of frames that the next survey takes: memory that is touched for the first time costs more than what is done in it.
+static KEPT: Mutex<Vec<Vec<f32>>> = Mutex::new(Vec::new());
+/// So many of so many samples at most are kept.
+const KEPT_FRAMES: usize = 16;
+const KEPT_SAMPLES: usize = 1 << 16;
+
 impl Band {
     fn new(frames: usize) -> Self {
-        Self { rows: 0, samples: vec![Vec::new(); frames], marks: vec![Vec::new(); frames] }
+        let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+        let samples = (0..frames).map(|_| kept.pop().unwrap_or_default()).collect();
+        Self { rows: 0, samples, marks: vec![Vec::new(); frames] }
     }
 
     /// Reads so many rows of frames of such a geometry, the layer of marks apart.
@@ -129,6 +139,14 @@ impl Band {
             }
             Ok(())
         })
+    }
+}
+
+impl Drop for Band {
+    fn drop(&mut self) {
+        let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+        let room = KEPT_FRAMES.saturating_sub(kept.len());
+        kept.extend(self.samples.drain(..).filter(|samples| samples.capacity() <= KEPT_SAMPLES).take(room));
     }
 }
 
@@ -165,7 +183,7 @@ impl<'a> Sums<'a> {
         let Self { geometry, sites, .. } = *self;
         let (planes, width) = (geometry.channels.len(), geometry.width);
         if first == 0 {
-            self.bits = samples.iter().flatten().fold(0, |bits, sample| bits | whole(*sample));
+            self.bits = samples.iter().fold(0, |bits, samples| bits | vectors::run(Bits(samples)));
         }
         self.quad.add(first, &samples[0], geometry);
         for row in 0..*rows {
@@ -184,7 +202,20 @@ impl<'a> Sums<'a> {
     }
 }
 
+/// The bits that any of some samples has.
+struct Bits<'a>(&'a [f32]);
+
+impl Kernel for Bits<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run(self) -> u32 {
+        self.0.iter().fold(0, |bits, sample| bits | whole(*sample))
+    }
+}
+
 /// A sample as a code; of what is no whole number all bits.
+#[inline(always)]
 fn whole(sample: f32) -> u32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "what does not fit is no code")]
     let code = sample as u32;
@@ -199,12 +230,7 @@ impl Quad {
     /// Adds rows, the first of which is row `first` of the frame.
     fn add(&mut self, first: usize, band: &[f32], geometry: &Geometry) {
         for (y, row) in band.chunks_exact(geometry.row_samples()).enumerate() {
-            // Sums run in lanes, which compilers make vectors of; even ones are of even columns.
-            let mut lanes = [0.0; 8];
-            let (eights, rest) = row[..geometry.width].as_chunks::<8>();
-            for samples in eights.iter().map(<[f32; 8]>::as_slice).chain([rest]) {
-                lanes.iter_mut().zip(samples).for_each(|(lane, sample)| *lane += f64::from(*sample));
-            }
+            let lanes = vectors::run(Lanes(&row[..geometry.width]));
             let of_row = &mut self.0[(first + y) % 2 * 2..][..2];
             for (parity, (sum, count)) in of_row.iter_mut().enumerate() {
                 *sum += lanes.iter().skip(parity).step_by(2).sum::<f64>();
@@ -215,6 +241,24 @@ impl Quad {
 
     fn means(&self) -> [f64; 4] {
         self.0.map(|(sum, count)| sum / f64::max(count, 1.0))
+    }
+}
+
+/// Sums of a row in lanes, which compilers make vectors of; even ones are of even columns.
+struct Lanes<'a>(&'a [f32]);
+
+impl Kernel for Lanes<'_> {
+    type Output = [f64; 8];
+
+    #[inline(always)]
+    fn run(self) -> [f64; 8] {
+        let mut lanes = [0.0; 8];
+        let (eights, rest) = self.0.as_chunks::<8>();
+        for samples in eights {
+            lanes.iter_mut().zip(samples).for_each(|(lane, sample)| *lane += f64::from(*sample));
+        }
+        lanes.iter_mut().zip(rest).for_each(|(lane, sample)| *lane += f64::from(*sample));
+        lanes
     }
 }
 

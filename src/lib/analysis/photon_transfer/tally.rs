@@ -1,7 +1,7 @@
 //! Sums over a grid of photosites, row by row, and what they tell.
 
 use super::falling::FallingSums;
-use super::lanes::{depart, dot, sum};
+use super::lanes::{center, depart, dot, fourth_powers, steps, sum};
 use super::marks::Marks;
 use super::neighbors::NeighborSums;
 use super::row_drift::RowScatter;
@@ -203,29 +203,20 @@ impl Tally {
     fn add_gathered(&mut self) {
         let columns = self.size[0];
         let count = columns as f64;
-        let share = 1.0 / self.frames as f64;
-        self.means.iter_mut().for_each(|mean| *mean *= share);
+        let mut share = 1.0 / self.frames as f64;
+        if self.row_means.is_empty() {
+            self.means.iter_mut().for_each(|mean| *mean *= share);
+            (self.center, share) = (sum(&self.means) / count, 1.0);
+        }
+        let about = [share, self.center];
+        let [above, squares] = center(&mut self.means, &mut self.above, &mut self.column_means, about);
         let (full, _) = self.full;
         if full < f64::INFINITY {
             self.full.1 += self.means.iter().map(|mean| u64::from(*mean >= full)).sum::<u64>();
         }
-        if self.row_means.is_empty() {
-            self.center = sum(&self.means) / count;
-        }
-        for ((above, mean), of_column) in self.above.iter_mut().zip(&self.means).zip(&mut self.column_means) {
-            *above = mean - self.center;
-            *of_column += *above;
-        }
-        let (above, squares) = (sum(&self.above), dot(&self.above, &self.above));
         self.row_means.push(above);
         self.squares += squares;
-        for (squared, pair) in self.squared.iter_mut().zip(self.above.windows(2)) {
-            *squared = (pair[1] - pair[0]).powi(2);
-        }
-        let squared = &self.squared[..columns - 1];
-        let [second, fourth] = [sum(squared), dot(squared, squared)];
-        let of_steps = [second, fourth, fourth_powers(squared)];
-        self.steps.iter_mut().zip(of_steps).for_each(|(sum, of_row)| *sum += of_row);
+        self.steps.iter_mut().zip(steps(&self.above)).for_each(|(sum, of_row)| *sum += of_row);
         self.squared.fill(0.0);
         let (summed, times, row) = (self.summed(), self.times(), self.row_means.len() - 1);
         let mut all = 0.0;
@@ -443,12 +434,6 @@ impl Tally {
         let freedom = (self.frames as f64 - 1.0) * n;
         (apart + together(&of_rows) + together(&of_columns)) / (freedom * freedom)
     }
-}
-
-/// Σ x⁴.
-#[inline(always)]
-fn fourth_powers(values: &[f64]) -> f64 {
-    values.iter().map(|value| (value * value).powi(2)).sum()
 }
 
 /// So many photosites of a grid that reach the top are few.

@@ -1,6 +1,7 @@
 //! Reading rows.
 
-use super::PLACE;
+use super::plain::PlainRows;
+use super::{DEFLATE_EXPANSION, PLACE};
 use crate::color::rgb::{Encoding, NamedPrimaries};
 use crate::error::{Error, Result};
 use crate::formats::exposure::ToldExposure;
@@ -25,7 +26,8 @@ pub const FORMAT: FrameFormat = FrameFormat {
     }),
 };
 
-/// What is asked of the system at once.
+/// What is asked of the system at once: where chunks before the samples are looked at alone, and where samples are read.
+const HEAD_READ_BYTES: usize = 4 << 10;
 const READ_BYTES: usize = 64 << 10;
 /// What texts and color profiles may take.
 const TEXT_BYTES: usize = 16 << 20;
@@ -34,21 +36,20 @@ const METADATA_BYTES: usize = 1 << 20;
 /// What a row may take however small the file is; if more, then so many times what the file has.
 const SMALL_BYTES: u64 = 64 << 20;
 const MOST_EXPANSION: u64 = 64;
-/// How many bytes one byte of Deflate can become at most: a match of 258 in two bits.
-const DEFLATE_EXPANSION: u64 = 1032;
 
 const CONVERT: &str = "convert it first, for example with `oiiotool in.png -o out.tif`";
 
 /// Reads the rows of a PNG.
 ///
 /// Channels are `Y`; `Y`, `A`; `R`, `G`, `B`; with `A`. Samples are those stored: a transfer function is not undone, alpha
-/// is not divided by. Memory is a few rows, and texts of up to 16 MiB.
+/// is not divided by. Memory is a few rows, and texts of up to 16 MiB; of a plain picture, where it is not large, it is all of it.
 pub struct PngReader {
     name: String,
     /// The file once more, and where it begins in there.
     file: File,
     start: u64,
-    reader: png::Reader<BufReader<File>>,
+    rows: Rows,
+    rows_read: usize,
     geometry: Geometry,
     /// Whether the file has its place, which may be the corner.
     tells_place: bool,
@@ -57,6 +58,23 @@ pub struct PngReader {
     own_tags: Metadata,
     colors: ColorTags,
     notes: Vec<String>,
+}
+
+/// Who reads rows.
+enum Rows {
+    Plain(Box<PlainRows>),
+    /// The crate, which reads all there are, and says what is wrong with them.
+    Any(Box<png::Reader<BufReader<File>>>),
+}
+
+/// The crate at the first byte of a picture, of which it reads so many bytes at once.
+fn begin(file: &File, start: u64, name: &str, capacity: usize) -> Result<png::Decoder<BufReader<File>>> {
+    let failed = |e| Error::disk(name, "read", e);
+    // Copies of an open file share the place that is read next.
+    let mut copy = file.try_clone().map_err(failed)?;
+    copy.seek(SeekFrom::Start(start)).map_err(failed)?;
+    let input = BufReader::with_capacity(capacity, copy);
+    Ok(png::Decoder::new_with_limits(input, Limits { bytes: TEXT_BYTES }))
 }
 
 impl PngReader {
@@ -72,10 +90,7 @@ impl PngReader {
         let failed = |e| Error::disk(name, "read", e);
         let start = file.stream_position().map_err(failed)?;
         let length = file.seek(SeekFrom::End(0)).map_err(failed)?.saturating_sub(start);
-        file.seek(SeekFrom::Start(start)).map_err(failed)?;
-        let copy = file.try_clone().map_err(failed)?;
-        let input = BufReader::with_capacity(READ_BYTES, file);
-        let mut decoder = png::Decoder::new_with_limits(input, Limits { bytes: TEXT_BYTES });
+        let mut decoder = begin(&file, start, name, HEAD_READ_BYTES)?;
         let damage = |error| png_damage(name, error);
         let header = decoder.read_header_info().map_err(damage)?;
         let refuse = |problem: String| Error::format(name, problem);
@@ -91,12 +106,22 @@ impl PngReader {
         if let Some(exif) = reader.info().exif_metadata.as_deref().filter(|_| embedded.is_none()) {
             ToldExposure::describe(tiff::exposure_of_block(exif, name, &mut notes)?, &mut own_tags);
         }
-        let place = place(&copy, start).unwrap_or_default();
+        let before = Before::of(&file, start).ok();
+        let place = before.as_ref().and_then(|before| before.place);
         let origin = place.unwrap_or_default();
+        let is_plain = channels.len() == 1 && reader.info().animation_control.is_none();
+        let rows = match before.filter(|_| is_plain) {
+            Some(Before { data, .. }) => {
+                let place = data.data..start + length;
+                Rows::Plain(Box::new(PlainRows::new([width, height], stored.bytes(), place, data.length)))
+            }
+            None => Rows::Any(Box::new(begin(&file, start, name, READ_BYTES)?.read_info().map_err(damage)?)),
+        };
         Ok(Self {
             name: name.into(),
-            file: copy,
             start,
+            rows,
+            rows_read: 0,
             geometry: Geometry { origin, ..Geometry::new(width, height, channels) },
             tells_place: place.is_some(),
             stored,
@@ -104,8 +129,19 @@ impl PngReader {
             own_tags,
             colors: colors(reader.info()),
             notes,
-            reader,
+            file,
         })
+    }
+
+    /// Has the crate read on behind the rows that were read.
+    fn leave_to_crate(&self) -> Result<png::Reader<BufReader<File>>> {
+        let damage = |error| png_damage(&self.name, error);
+        let decoder = begin(&self.file, self.start, &self.name, READ_BYTES)?;
+        let mut reader = decoder.read_info().map_err(damage)?;
+        for _ in 0..self.rows_read {
+            reader.next_row().map_err(damage)?;
+        }
+        Ok(reader)
     }
 }
 
@@ -136,23 +172,33 @@ impl Chunk {
     }
 }
 
-/// The place on the sensor that stands before the samples, where one does.
-///
-/// # Errors
-///
-/// Where the file ends before the samples: who reads these says so.
-fn place(file: &File, start: u64) -> io::Result<Option<[i32; 2]>> {
-    let mut chunk = Chunk::first(file, start)?;
-    while chunk.kind != *b"IDAT" {
-        if (chunk.kind, chunk.length) == (PLACE, 9) {
-            let mut told = [0; 9];
-            file.read_exact_at(&mut told, chunk.data)?;
-            let [a, b, c, d, e, f, g, h, unit] = told;
-            return Ok((unit == 0).then(|| [[a, b, c, d], [e, f, g, h]].map(i32::from_be_bytes)));
+/// What chunks before the samples say, and the first of samples.
+struct Before {
+    /// The place on the sensor.
+    place: Option<[i32; 2]>,
+    data: Chunk,
+}
+
+impl Before {
+    /// Of a picture that begins at such a place.
+    ///
+    /// # Errors
+    ///
+    /// Where the file ends before the samples: who reads these says so.
+    fn of(file: &File, start: u64) -> io::Result<Self> {
+        let mut place = None;
+        let mut chunk = Chunk::first(file, start)?;
+        while chunk.kind != *b"IDAT" {
+            if (chunk.kind, chunk.length) == (PLACE, 9) && place.is_none() {
+                let mut told = [0; 9];
+                file.read_exact_at(&mut told, chunk.data)?;
+                let [a, b, c, d, e, f, g, h, unit] = told;
+                place = Some((unit == 0).then(|| [[a, b, c, d], [e, f, g, h]].map(i32::from_be_bytes)));
+            }
+            chunk = Chunk::at(file, chunk.end())?;
         }
-        chunk = Chunk::at(file, chunk.end())?;
+        Ok(Self { place: place.flatten(), data: chunk })
     }
-    Ok(None)
 }
 
 /// The place behind the last chunk.
@@ -333,8 +379,18 @@ impl SampleReader for PngReader {
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {
         let channels = self.geometry.channels.len();
         samples.reserve(rows * self.geometry.row_samples());
+        if let Rows::Plain(plain) = &mut self.rows {
+            let before = samples.len();
+            if plain.read(&self.file, rows, samples).is_ok() {
+                self.rows_read += rows;
+                return Ok(());
+            }
+            samples.truncate(before);
+            self.rows = Rows::Any(Box::new(self.leave_to_crate()?));
+        }
+        let Rows::Any(reader) = &mut self.rows else { return Ok(()) };
         for _ in 0..rows {
-            let row = self.reader.next_row().map_err(|error| png_damage(&self.name, error))?;
+            let row = reader.next_row().map_err(|error| png_damage(&self.name, error))?;
             let Some(row) = row else { return Err(Error::cut_short(&self.name)) };
             for channel in 0..channels {
                 match self.stored {
@@ -497,5 +553,163 @@ mod tests {
         sum.update(&changed[12..29]);
         changed[29..33].copy_from_slice(&sum.sum().to_be_bytes());
         changed
+    }
+
+    /// What a reader gives, or complains of, a band of rows at a time.
+    fn all_rows(opened: Result<PngReader>) -> std::result::Result<Vec<u32>, String> {
+        let mut reader = opened.map_err(|error| error.to_string())?;
+        let mut samples = Vec::new();
+        let height = reader.geometry().height;
+        for first in (0..height).step_by(5) {
+            reader.read(5.min(height - first), &mut samples).map_err(|error| error.to_string())?;
+        }
+        reader.rest().map_err(|error| error.to_string())?;
+        Ok(samples.into_iter().map(f32::to_bits).collect())
+    }
+
+    /// The same by the crate alone.
+    fn all_rows_of_crate(bytes: &[u8]) -> std::result::Result<Vec<u32>, String> {
+        all_rows(opened(bytes, 0).and_then(|mut reader| {
+            reader.rows = Rows::Any(Box::new(reader.leave_to_crate()?));
+            Ok(reader)
+        }))
+    }
+
+    /// Whether all rows of a file were read without the crate.
+    fn is_plain_to_the_end(bytes: &[u8]) -> bool {
+        let mut reader = opened(bytes, 0).unwrap();
+        reader.read(reader.geometry().height, &mut Vec::new()).unwrap();
+        matches!(reader.rows, Rows::Plain(_))
+    }
+
+    fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+        let mut bytes = [kind, data].concat();
+        let mut sum = flate2::Crc::new();
+        sum.update(&bytes);
+        bytes.extend(sum.sum().to_be_bytes());
+        [&u32::try_from(data.len()).unwrap().to_be_bytes()[..], &bytes].concat()
+    }
+
+    /// A gray picture 23 wide of so many rows, of chunks of so many bytes of data; a row is filtered by the filters in turn.
+    fn gray(depth: BitDepth, rows: u32, level: u32, chunk_bytes: usize) -> Vec<u8> {
+        of_data([23, rows], depth, &packed(&filtered(depth, rows), level), chunk_bytes)
+    }
+
+    fn filtered(depth: BitDepth, rows: u32) -> Vec<u8> {
+        let row_bytes = 23 * depth as usize / 8;
+        let mut state = 1_u64;
+        let mut bytes = Vec::new();
+        for row in 0..rows {
+            // Filters of noise are as good as noise: whatever the bytes are, they are some picture, filtered.
+            bytes.push(u8::try_from(row % 5).unwrap());
+            for _ in 0..row_bytes {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                bytes.push((state >> 59).to_le_bytes()[0] * 8);
+            }
+        }
+        bytes
+    }
+
+    fn packed(bytes: &[u8], level: u32) -> Vec<u8> {
+        use flate2::{Compression, write::ZlibEncoder};
+        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(level));
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    }
+
+    /// A gray picture of such data, an empty chunk before.
+    fn of_data([width, height]: [u32; 2], depth: BitDepth, data: &[u8], chunk_bytes: usize) -> Vec<u8> {
+        let header = [&width.to_be_bytes()[..], &height.to_be_bytes(), &[depth as u8, 0, 0, 0, 0]].concat();
+        let mut bytes = [b"\x89PNG\r\n\x1A\n".to_vec(), chunk(b"IHDR", &header), chunk(b"IDAT", &[])].concat();
+        data.chunks(chunk_bytes).for_each(|data| bytes.extend(chunk(b"IDAT", data)));
+        bytes.extend(chunk(b"IEND", &[]));
+        bytes
+    }
+
+    #[test]
+    fn plain_rows_are_those_of_the_crate_to_the_bit() {
+        for depth in [BitDepth::Eight, BitDepth::Sixteen] {
+            for (rows, level) in [(1, 6), (31, 0), (31, 1), (31, 6), (31, 9), (4000, 0), (4000, 6)] {
+                for chunk_bytes in [7, 8192, 40_000, 1 << 20] {
+                    let bytes = gray(depth, rows, level, chunk_bytes);
+                    let wanted = all_rows_of_crate(&bytes).unwrap();
+                    assert_eq!(wanted.len(), 23 * rows as usize);
+                    assert!(all_rows(opened(&bytes, 0)) == Ok(wanted), "{depth:?} {rows} {level} {chunk_bytes}");
+                    assert!(is_plain_to_the_end(&bytes));
+                }
+            }
+        }
+    }
+
+    /// Wherever a byte is another, or the file ends, samples and complaints are those of the crate.
+    #[test]
+    fn damage_is_what_the_crate_calls_it() {
+        for level in [0, 1, 9] {
+            let whole = gray(BitDepth::Sixteen, 11, level, 300);
+            let same = |bytes: &[u8], what: &str| {
+                assert_eq!(all_rows(opened(bytes, 0)), all_rows_of_crate(bytes), "{level} {what}");
+            };
+            for at in 0..whole.len() {
+                let mut changed = whole.clone();
+                changed[at] ^= 1 << (at % 8);
+                same(&changed, &format!("byte {at}"));
+                // The same where the checksum is that of what is wrong.
+                same(&with_sums(&changed), &format!("byte {at} with its checksum"));
+                same(&whole[..at], &format!("cut to {at}"));
+            }
+        }
+    }
+
+    /// Bytes behind the stream, rows behind the picture and none for the last, another sum behind the stream or none.
+    #[test]
+    fn streams_of_another_length_are_what_the_crate_takes_them_for() {
+        let rows = filtered(BitDepth::Eight, 31);
+        let stream = packed(&rows, 6);
+        let end = stream.len() - 4;
+        let longer = packed(&[&rows[..], &[3; 24]].concat(), 6);
+        let shorter = packed(&rows[..30 * 24], 6);
+        let sum = [&stream[..end], &[1, 2, 3, 4]].concat();
+        let streams = [[&stream[..], &[7; 50]].concat(), longer, shorter, sum, stream[..end].to_vec()];
+        for (which, data) in streams.iter().enumerate() {
+            for chunk_bytes in [50, 1 << 20] {
+                let bytes = of_data([23, 31], BitDepth::Eight, data, chunk_bytes);
+                assert_eq!(all_rows(opened(&bytes, 0)), all_rows_of_crate(&bytes), "{which} {chunk_bytes}");
+            }
+        }
+        // A header that says more than the data can be is not believed where other chunks make the file long.
+        let mut bytes = of_data([23, 40_000], BitDepth::Eight, &packed(&rows[..48], 6), 1 << 20);
+        bytes.extend(chunk(b"teXt", &[b'a'; 2000]));
+        assert_eq!(all_rows(opened(&bytes, 0)), all_rows_of_crate(&bytes));
+    }
+
+    /// What takes more than 64 MiB is left to the crate, which streams it.
+    #[test]
+    fn large_pictures_are_streamed() {
+        for (height, is_plain) in [(63, true), (64, false)] {
+            let rows = vec![0; height * ((1 << 20) + 1)];
+            let size = [1 << 20, u32::try_from(height).unwrap()];
+            let mut reader = opened(&of_data(size, BitDepth::Eight, &packed(&rows, 1), 1 << 20), 0).unwrap();
+            let mut samples = Vec::new();
+            reader.read(1, &mut samples).unwrap();
+            assert!(samples.len() == 1 << 20 && samples.iter().all(|sample| *sample == 0.0));
+            assert_eq!(matches!(reader.rows, Rows::Plain(_)), is_plain);
+        }
+    }
+
+    /// The same with checksums of what the chunks hold, as far as these follow one another.
+    fn with_sums(bytes: &[u8]) -> Vec<u8> {
+        let mut bytes = bytes.to_vec();
+        let mut at = 8;
+        while let Some(length) = bytes.get(at..).and_then(|rest| rest.first_chunk::<4>()).copied() {
+            let end = at + 8 + u32::from_be_bytes(length) as usize;
+            if end + 4 > bytes.len() {
+                break;
+            }
+            let mut sum = flate2::Crc::new();
+            sum.update(&bytes[at + 4..end]);
+            bytes[end..end + 4].copy_from_slice(&sum.sum().to_be_bytes());
+            at = end + 4;
+        }
+        bytes
     }
 }
