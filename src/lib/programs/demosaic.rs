@@ -70,9 +70,7 @@ fn demosaic(arguments: &Arguments, turn: &cli::Turn<'_>) -> Result<()> {
     session.tell(requests::of_bent_codes(reader.header()).as_slice());
     if arguments.sigma {
         let stage = WithSigma::of_demosaicking(stage)?;
-        session.tell(requests::of_undrawn(reader.header()).as_slice());
-        session.tell(requests::of_coarse_codes(reader.header()).as_slice());
-        session.tell(requests::of_sigma_beside_defects(reader.header()).as_slice());
+        session.tell(&requests::of_sigma(reader.header()));
         session.drive(reader, &stage, output)
     } else {
         dim_green_below(stage.header()).into_iter().for_each(|level| stage.count_greens_below(level));

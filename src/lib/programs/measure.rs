@@ -74,9 +74,6 @@ fn measure(arguments: &Arguments, turn: &cli::Turn<'_>, findings: &Findings) -> 
         session.place(reader.header(), &Output { output: Some(path.clone()), ..output.clone() })?;
         plots::write_plot(path, &report::portrait(portrait, &report.regions[0]))?;
     }
-    session.tell(&requests::of_statistics(&report));
-    if report.unpredicted.is_none() {
-        session.tell(requests::of_listed_defects(reader.header()).as_slice());
-    }
+    session.tell(&requests::of_statistics(&report, reader.header()));
     findings.add(reader.header(), output.index, report)
 }

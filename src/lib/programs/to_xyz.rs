@@ -69,9 +69,7 @@ fn convert(
     session.sign(stage.header_mut());
     if *sigma {
         let stage = WithSigma::of_conversion(stage, reader.header())?;
-        session.tell(requests::of_undrawn(reader.header()).as_slice());
-        session.tell(requests::of_coarse_codes(reader.header()).as_slice());
-        session.tell(requests::of_sigma_beside_defects(reader.header()).as_slice());
+        session.tell(&requests::of_sigma(reader.header()));
         session.drive(reader, &stage, output)
     } else {
         session.drive(reader, &stage, output)

@@ -173,7 +173,7 @@ impl Law {
             effort::spend(1);
             return laws.nodes().filter(is_met).for_each(of);
         }
-        if let Some(nodes) = self.nodes_of_sum(noise_e, reading.noise_e) {
+        if let Some(nodes) = self.nodes_of_sum(noise_e) {
             effort::spend(nodes.len() as u64);
             return nodes.into_iter().filter(is_met).for_each(of);
         }
@@ -227,8 +227,8 @@ impl Law {
 
     /// The same by the sum n of both counts, where they are many pairs: given n each is binomial, and the variance over photosites,
     /// σ₁² n₁² + σ₂² n₂², which has its mean for all pairs of one sum, scatters by so small a share δ of all variance that moments
-    /// change by δ²/8, 10⁻⁷, and by next to nothing from one count to the next: patterns or what is added blur counts, or leave each apart.
-    fn nodes_of_sum(&self, noise_e: f64, added_e: f64) -> Option<Vec<Node>> {
+    /// change by δ²/8, 10⁻⁷, and by next to nothing from one count to the next: patterns, or what is added before anything is cut off, blur counts, or leave each apart.
+    fn nodes_of_sum(&self, noise_e: f64) -> Option<Vec<Node>> {
         const MANY_PAIRS: f64 = 1000.0;
         const MOST_SCATTER: f64 = 1e-3;
         const BLURRED_E: f64 = 1.0;
@@ -240,7 +240,7 @@ impl Law {
         let widest_e = (self.light.pattern * self.light.rate).hypot(self.dark.pattern * self.dark.rate);
         if !both.into_iter().all(is_counted)
             || both.into_iter().any(is_cut)
-            || spread_e.max(added_e) < BLURRED_E && widest_e > APART_E
+            || spread_e.max(noise_e) < BLURRED_E && widest_e > APART_E
             || self.has_floors()
         {
             return None;

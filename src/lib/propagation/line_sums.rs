@@ -11,7 +11,7 @@ use super::blur::blur_e;
 use super::effort;
 use super::law::Law;
 use super::line_means::{FewMeans, Kinds, LineMeans};
-use super::lines::{Axis, COARSE_LINES, MOST_NODES, TOO_COARSE, nodes};
+use super::lines::{Axis, BLURRED, COARSE_LINES, MOST_NODES, TOO_COARSE, nodes};
 use super::moments::LineCovariance;
 use super::photosite::Photosite;
 use super::unpredictable::{Predicted, Unpredictable};
@@ -225,9 +225,12 @@ impl Shared {
             let rest = part(&site.model);
             for expected_e in *expected_e {
                 let (mut kinds, adc) = (site.kinds_of_line(expected_e, part), site.adc);
-                let few = if frames.is_none() { kinds.split_off_few() } else { Vec::new() };
-                // Of hot photosites that are full nothing blurs codes but what is added.
-                let of_full_e = if rest.tails.has_hot() && few.is_empty() { rest.added() } else { f64::INFINITY };
+                // Of photosites that are full nothing blurs codes but what is added, and few of them do not follow what is shared on a curve.
+                let is_coarse = adc.is_some_and(|adc| adc.adu_per_e * rest.added() < BLURRED);
+                let are_steps = is_coarse && kinds.laws.iter().any(|(_, law)| law.are_few && law.reaches_full_well());
+                let few = if frames.is_none() && !are_steps { kinds.split_off_few() } else { Vec::new() };
+                let are_full = site.nears_full_well(expected_e) || rest.tails.has_hot() && few.is_empty();
+                let of_full_e = if are_full { rest.added() } else { f64::INFINITY };
                 let blur_e = adc.map_or(f64::INFINITY, |adc| blur_e(&rest, &adc, expected_e).min(of_full_e));
                 let is_same =
                     |class: &Class| class.kinds == kinds && class.adc == adc && class.expected_e == expected_e;

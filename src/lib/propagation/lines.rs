@@ -38,7 +38,7 @@ use crate::stages::noise::{LineNoise, NoiseModel};
 use nalgebra::Matrix3;
 
 /// The standard deviation, in codes, of what is a photosite's own from which codes follow what it shares as straight lines do.
-const BLURRED: f64 = 0.6;
+pub(super) const BLURRED: f64 = 0.6;
 
 /// The same from which they do so on the mean: e^(−4π²σ²)/2π² is 2·10⁻⁵ of a squared code.
 const BLURRED_ON_AVERAGE: f64 = 0.45;
@@ -336,7 +336,7 @@ impl Photosite {
     }
 
     /// Whether so many photosites are full that what they share is told by fewer: one in 10¹³ or more.
-    fn nears_full_well(&self, expected_e: f64) -> bool {
+    pub(super) fn nears_full_well(&self, expected_e: f64) -> bool {
         const DEVIATIONS: f64 = 7.5;
         // Counts are skewed: so many more are as rare.
         const SKEWED_E: f64 = 30.0;

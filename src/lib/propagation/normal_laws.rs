@@ -262,9 +262,9 @@ mod tests {
                     found.iter_mut().zip(at).for_each(|(sum, moment)| *sum += node.weight * moment);
                 }
                 let allowed = if are_few { 2e-4 } else { 2e-9 };
-                for (j, (found, wanted)) in found.iter().zip(wanted).enumerate().take(2) {
-                    let scale = (0.25 * std).powi(j as i32 + 1);
-                    assert!((found - wanted).abs() < allowed * scale, "{law:?} {deviations} {j}: {found} {wanted}");
+                for (power, (found, wanted)) in (1..=2).zip(found.iter().zip(wanted)) {
+                    let scale = (0.25 * std).powi(power);
+                    assert!((found - wanted).abs() < allowed * scale, "{law:?} {deviations} {power}: {found} {wanted}");
                 }
             }
         }

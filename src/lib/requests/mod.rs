@@ -48,8 +48,8 @@ pub use comparison::ColorPair;
 pub use conversion::Conversion;
 pub use fit::Fit;
 pub use notes::{
-    Note, of_bent_codes, of_coarse_codes, of_expected, of_levels, of_listed_defects, of_marks, of_over_frames,
-    of_reader, of_sigma_beside_defects, of_slope, of_statistics, of_undrawn,
+    Note, of_bent_codes, of_expected, of_levels, of_listed_defects, of_marks, of_over_frames, of_reader, of_sigma,
+    of_sigma_beside_defects, of_slope, of_statistics,
 };
 pub use options::SignalLevel;
 pub use prediction::NoisePrediction;

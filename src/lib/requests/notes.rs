@@ -57,7 +57,7 @@ pub fn of_over_frames(report: &RepeatedReport) -> Vec<Note> {
 }
 
 /// What came up among statistics.
-pub fn of_statistics(report: &Report) -> Vec<Note> {
+pub fn of_statistics(report: &Report, frame: &FrameHeader) -> Vec<Note> {
     let not_finite = report.regions.iter().map(|region| region.not_finite).sum();
     let pixels: u64 = report.regions.iter().map(|region| region.saturated).sum();
     let saturated = match report.regions.iter().any(|region| region.leaves_saturated_out) {
@@ -85,7 +85,8 @@ pub fn of_statistics(report: &Report) -> Vec<Note> {
         .map(|why| format!("nothing is predicted of the patches: {why}"));
     let marked =
         saturated.into_iter().chain(defective).chain(beyond).chain(other).chain(unpredicted).map(Note::Warning);
-    Note::not_finite(not_finite).into_iter().chain(marked).collect()
+    let listed = report.unpredicted.is_none().then(|| of_listed_defects(frame)).flatten();
+    Note::not_finite(not_finite).into_iter().chain(marked).chain(listed).collect()
 }
 
 /// A warning of a mean that is not that of the scene and the camera of the metadata, by far more than chance.
@@ -162,14 +163,19 @@ fn has_sigma(frame: &FrameHeader) -> bool {
     frame.metadata.history.iter().any(is_given)
 }
 
+/// Warnings of standard deviations beside pixels; not where a program before gave them.
+pub fn of_sigma(input: &FrameHeader) -> Vec<Note> {
+    [of_undrawn(input), of_coarse_codes(input), of_sigma_beside_defects(input)].into_iter().flatten().collect()
+}
+
 /// A warning of standard deviations beside pixels that have no noise; not where a program before gave it.
-pub fn of_undrawn(input: &FrameHeader) -> Option<Note> {
+fn of_undrawn(input: &FrameHeader) -> Option<Note> {
     let text = "no noise was drawn; the standard deviations are those of noisy frames of the same scene";
     (input.is_undrawn() && !has_sigma(input)).then(|| Note::Warning(text.into()))
 }
 
 /// A warning of standard deviations of codes that noise does not blur; not where a program before gave it.
-pub fn of_coarse_codes(frame: &FrameHeader) -> Option<Note> {
+fn of_coarse_codes(frame: &FrameHeader) -> Option<Note> {
     if has_sigma(frame) {
         return None;
     }
