@@ -463,6 +463,21 @@ mod tests {
         }
     }
 
+    /// Photosites that are all full are blurred by what is added alone, whatever shot noise their light has: about the edge of a code at full
+    /// well two of a row are of one bit.
+    #[test]
+    fn rows_of_full_photosites_follow_the_edges_of_codes() {
+        let [read_noise_e, row_noise_e] = [0.5_f64, 0.7];
+        let lines = LineNoise { row_noise_e, ..LineNoise::default() };
+        let plain = of_one_bit(0.0, 0.0);
+        let model = NoiseModel { read_noise_e, full_well_e: 2005.0, signal_shot: true, lines, ..plain.model };
+        // 2005 e⁻ are 328.5 codes.
+        let site = Photosite::of_electrons(model, Equations::Exact).digitized(AdcRecord::new(11, 128.0, 0.1));
+        let wanted = (row_noise_e.powi(2) / (row_noise_e.powi(2) + read_noise_e.powi(2))).asin() / TAU;
+        let found = site.lines([8000.0; 3]).unwrap()[0].row[1];
+        assert!((found - wanted).abs() < 1e-6, "{found} {wanted}");
+    }
+
     /// Readings that jump by −a, 0 or a, a exponential of mean A, are off by nothing or, half of them, by a number of density
     /// e^(−|x|/A)/2A: the chance that such a one and a normal one together are beyond a code has a closed form. Means are sums of it over
     /// the codes from the lowest on, the covariance that of the trapezoidal rule. Panels of 5 nodes in a are good to 10⁻⁶ of what jumps do.
