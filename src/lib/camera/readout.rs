@@ -222,7 +222,10 @@ impl ReadOut {
                 Err("`dark_current_na_per_cm2` is that of an area, which needs `pixel_pitch_um`".into())
             }
             (Some(_), None, Some(_)) | (None, Some(_), _) => Ok(()),
-            _ => Err("it must have one of `dark_current_na_per_cm2` and `dark_current_e_per_s`".into()),
+            (Some(_), Some(_), _) => {
+                Err("it has both `dark_current_na_per_cm2` and `dark_current_e_per_s`; leave one of them out".into())
+            }
+            (None, None, _) => Err("it must have `dark_current_na_per_cm2` or `dark_current_e_per_s`".into()),
         }
     }
 

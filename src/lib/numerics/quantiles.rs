@@ -2,7 +2,7 @@
 
 use statrs::function::beta::checked_beta_reg;
 use statrs::function::erf::erf_inv;
-use statrs::function::gamma::checked_gamma_lr;
+use statrs::function::gamma::{checked_gamma_lr, ln_gamma};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::thread::LocalKey;
@@ -16,7 +16,7 @@ pub fn of_normal(p: f64) -> f64 {
 const MANY: f64 = 2000.0;
 
 /// The sum of squares of `freedom` degrees of freedom, whole or not, that a share `p` lies below, 0 < p < 1: for few by
-/// bisection of the incomplete gamma function, for many by the cube of a normal deviate \[WH1931].
+/// that of the incomplete gamma function, for many by the cube of a normal deviate \[WH1931].
 pub fn of_chi_square(p: f64, freedom: f64) -> f64 {
     let ninth = 2.0 / (9.0 * freedom);
     let near = freedom * (1.0 - ninth + of_normal(p) * ninth.sqrt()).max(0.0).powi(3);
@@ -24,21 +24,16 @@ pub fn of_chi_square(p: f64, freedom: f64) -> f64 {
         return near;
     }
     remembered(&CHI_SQUARES, [p, freedom], || {
-        let below = |x: f64| checked_gamma_lr(freedom / 2.0, x / 2.0).unwrap_or(1.0);
-        let (mut low, mut high) = (0.0, near.max(1.0));
-        while below(high) < p {
-            high *= 2.0;
-        }
-        // Doubles have 53 bits.
-        for _ in 0..60 {
-            let middle = f64::midpoint(low, high);
-            if below(middle) < p { low = middle } else { high = middle }
-        }
-        f64::midpoint(low, high)
+        let half = freedom / 2.0;
+        let scale = half * std::f64::consts::LN_2 + ln_gamma(half);
+        solved(near.max(f64::MIN_POSITIVE), |x| {
+            let density = ((half - 1.0) * x.ln() - x / 2.0 - scale).exp();
+            [checked_gamma_lr(half, x / 2.0).unwrap_or(1.0) - p, density]
+        })
     })
 }
 
-/// The deviate of Student's law of `freedom` degrees of freedom, whole or not, that a share `p` lies below, ½ ≤ p < 1, by bisection of
+/// The deviate of Student's law of `freedom` degrees of freedom, whole or not, that a share `p` lies below, ½ ≤ p < 1, by that of
 /// the incomplete beta function \[AbramowitzStegun1964, Eq. 26.7.1].
 pub fn of_student(p: f64, freedom: f64) -> f64 {
     /// From so many on it is the normal law to 10⁻⁶ of the quantile.
@@ -47,18 +42,41 @@ pub fn of_student(p: f64, freedom: f64) -> f64 {
         return of_normal(p);
     }
     remembered(&DEVIATES, [p, freedom], || {
-        let above = |t: f64| 0.5 * checked_beta_reg(freedom / 2.0, 0.5, freedom / (freedom + t * t)).unwrap_or(0.0);
-        let (mut low, mut high) = (0.0, 1.0);
-        while above(high) > 1.0 - p && high < f64::MAX {
-            high *= 2.0;
-        }
-        // Doubles have 53 bits.
-        for _ in 0..60 {
-            let middle = f64::midpoint(low, high);
-            if above(middle) > 1.0 - p { low = middle } else { high = middle }
-        }
-        f64::midpoint(low, high)
+        let half = freedom / 2.0;
+        let scale = ln_gamma(half + 0.5) - ln_gamma(half) - 0.5 * (freedom * std::f64::consts::PI).ln();
+        solved(of_normal(p), |t| {
+            let above = 0.5 * checked_beta_reg(half, 0.5, freedom / (freedom + t * t)).unwrap_or(0.0);
+            [1.0 - p - above, (scale - (half + 0.5) * (t * t / freedom).ln_1p()).exp()]
+        })
     })
+}
+
+/// The number ≥ 0 at which a law's share below is what is asked, from `near` on: `off` tells how much more it is at any, and the density
+/// there. By Newton's steps, and by halves where these lead beyond what is known.
+fn solved(near: f64, off: impl Fn(f64) -> [f64; 2]) -> f64 {
+    /// Steps so small leave what doubles hold.
+    const NONE: f64 = 1e-12;
+    const MOST_STEPS: usize = 200;
+    let (mut low, mut high, mut at) = (0.0, f64::INFINITY, near);
+    for _ in 0..MOST_STEPS {
+        let [over, density] = off(at);
+        if over < 0.0 {
+            low = at;
+        } else {
+            high = at;
+        }
+        let newton = at - over / density;
+        let next = match newton > low && newton < high {
+            true => newton,
+            false if high.is_finite() => f64::midpoint(low, high),
+            false => 2.0 * at + f64::MIN_POSITIVE,
+        };
+        if (next - at).abs() <= NONE * at {
+            return next;
+        }
+        at = next;
+    }
+    at
 }
 
 /// What was asked last, with what came of it.

@@ -487,4 +487,29 @@ mod tests {
             assert!((found / expected - 1.0).abs() < most_off, "{full_well_e}: {found} {expected}");
         }
     }
+
+    /// Full photosites half a code off, whose offsets scatter by as much as read noise, a tenth of a code: the code of one of offset u is the
+    /// higher of two with Φ(u/r), which is uniform over photosites. Its variance is 1/12, of 1/4 in all, however wide the light scatters.
+    #[test]
+    fn full_photosites_show_their_offsets_by_how_codes_are_rounded() {
+        for (light_e, prnu) in [(2600.0, 0.0), (2600.0, 0.01), (26_000.0, 0.0)] {
+            let model = NoiseModel {
+                dark_e: 0.0,
+                dcnu: 0.0,
+                prnu,
+                read_noise_e: 1.0,
+                full_well_e: 2005.0,
+                dark_shot: true,
+                signal_shot: true,
+                poisson: PoissonKind::Exact,
+                lines: LineNoise { dsnu_e: 1.0, ..LineNoise::default() },
+                tails: Tails::default(),
+            };
+            let site = Photosite::of_electrons(model, Equations::Exact).digitized(AdcRecord::new(10, 128.0, 0.1));
+            let whole = site.moments(light_e).moments.variance;
+            let anew = site.temporal_variance(light_e, whole);
+            assert!((whole - 0.25).abs() < 1e-9, "{light_e}: {whole}");
+            assert!((anew - 1.0 / 6.0).abs() < 1e-7, "{light_e}: {anew}");
+        }
+    }
 }

@@ -53,6 +53,11 @@ impl Charge {
         if self.is_certain() { 0.0 } else { self.rate.sqrt() }
     }
 
+    /// Whether its electrons are counted.
+    pub fn is_counted(&self) -> bool {
+        self.shot == Some(PoissonKind::Exact) && self.shot_std() > 0.0
+    }
+
     fn is_certain(&self) -> bool {
         self.shot.is_none() || self.rate <= 0.0 || self.rate > CERTAIN
     }

@@ -15,7 +15,7 @@ use super::node::{MANY_WELLS, Node};
 use super::reading::{Asked, ENDLESS, Moments, Reading, codes_of};
 use super::rectified::{corrections, signed_nodes};
 use crate::frame::to_sample;
-use crate::metadata::{AdcRecord, PoissonKind};
+use crate::metadata::AdcRecord;
 use crate::numerics::normal::NearlyNormal;
 use crate::numerics::rounding::{REACH, Rounding, SMOOTH};
 use crate::stages::noise::NoiseModel;
@@ -27,6 +27,9 @@ const LEAST_STD: f64 = 1e-6;
 
 /// Evaluations that a normal law takes beside an end of the codes, more than others.
 const OF_ENDS: u64 = 8;
+
+/// Evaluations that working out normal laws takes as long as.
+const OF_NORMALS: u64 = 60;
 
 /// Weights below this do not count.
 const LEAST_WEIGHT: f64 = 1e-19;
@@ -170,7 +173,7 @@ impl Law {
         let is_of_tails = matches!(reading.asked, Asked::Beyond(_)) && !self.are_few;
         let is_met = |node: &Node| !is_idle(node.mean, REACH * node.std);
         if let Some(laws) = (!is_of_tails).then(|| self.as_normals(noise_e, reading.noise_e)).flatten() {
-            effort::spend(1);
+            effort::spend(OF_NORMALS);
             return laws.nodes().filter(is_met).for_each(of);
         }
         if let Some(nodes) = self.nodes_of_sum(noise_e) {
@@ -227,18 +230,18 @@ impl Law {
 
     /// The same by the sum n of both counts, where they are many pairs: given n each is binomial, and the variance over photosites,
     /// σ₁² n₁² + σ₂² n₂², which has its mean for all pairs of one sum, scatters by so small a share δ of all variance that moments
-    /// change by δ²/8, 10⁻⁷, and by next to nothing from one count to the next: patterns, or what is added before anything is cut off, blur counts, or leave each apart.
+    /// change by δ²/8, 10⁻⁷, and by next to nothing from one count to the next: patterns, or what is added before anything is cut off,
+    /// blur counts, or leave each apart.
     fn nodes_of_sum(&self, noise_e: f64) -> Option<Vec<Node>> {
         const MANY_PAIRS: f64 = 1000.0;
         const MOST_SCATTER: f64 = 1e-3;
         const BLURRED_E: f64 = 1.0;
         const APART_E: f64 = 0.1;
         let both = [&self.light, &self.dark];
-        let is_counted = |charge: &Charge| charge.shot == Some(PoissonKind::Exact) && charge.shot_std() > 0.0;
         let is_cut = |charge: &Charge| charge.is_rectified(self.full_well_e);
         let spread_e = self.least_pattern_std();
         let widest_e = (self.light.pattern * self.light.rate).hypot(self.dark.pattern * self.dark.rate);
-        if !both.into_iter().all(is_counted)
+        if !both.into_iter().all(Charge::is_counted)
             || both.into_iter().any(is_cut)
             || spread_e.max(noise_e) < BLURRED_E && widest_e > APART_E
             || self.has_floors()

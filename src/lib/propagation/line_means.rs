@@ -8,6 +8,7 @@
 //!
 //! and so the mean of the square. M is worked out at even distances only, and only where an end of the codes is within reach: elsewhere it is straight, or constant.
 
+use super::effort;
 use super::law::Law;
 use super::reading::{Reading, codes_of};
 use crate::metadata::AdcRecord;
@@ -251,8 +252,11 @@ impl LineMeans {
         sum.map(|sum| sum / all)
     }
 
-    /// M, by each kind.
+    /// M, by each kind; nothing of use where no more work is allowed.
     fn quiet(&self, offset_e: f64) -> Pair {
+        if effort::is_spent() {
+            return [0.0; 2];
+        }
         let reading = self.reading.off_by(offset_e);
         let [lower, upper] = self.ends_e;
         let is_within = |[low, high]: [f64; 2]| self.adc.is_none() || low + offset_e > lower && high + offset_e < upper;

@@ -2,7 +2,8 @@
 
 use super::effort;
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// The last answers of a thread.
 pub(super) struct Memory<Key, Answer>(RefCell<Known<Key, Answer>>);
@@ -12,8 +13,29 @@ pub(super) struct Memory<Key, Answer>(RefCell<Known<Key, Answer>>);
 struct Known<Key, Answer> {
     answers: Vec<(u64, Key, Answer, u64)>,
     next: usize,
-    places: BTreeMap<u64, usize>,
+    places: HashMap<u64, usize, BuildHasherDefault<AsPrinted>>,
 }
+
+/// Prints are spread already.
+#[derive(Default)]
+struct AsPrinted(u64);
+
+impl Hasher for AsPrinted {
+    fn write(&mut self, _: &[u8]) {
+        unreachable!("prints are single numbers");
+    }
+
+    fn write_u64(&mut self, print: u64) {
+        self.0 = print;
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
+}
+
+/// Evaluations that it takes as long as to look for an answer, and to keep one.
+const OF_LOOK: u64 = 25;
 
 /// As many answers as one scene asks for, with those of all kinds of its hot photosites.
 const KEPT: usize = 4096;
@@ -75,12 +97,14 @@ impl<Key: PartialEq, Answer: Copy> Known<Key, Answer> {
 
 impl<Key: PartialEq + Print, Answer: Copy> Memory<Key, Answer> {
     pub const fn new() -> Self {
-        Self(RefCell::new(Known { answers: Vec::new(), next: 0, places: BTreeMap::new() }))
+        let places = HashMap::with_hasher(BuildHasherDefault::new());
+        Self(RefCell::new(Known { answers: Vec::new(), next: 0, places }))
     }
 
     /// The answer, worked out unless it is known. Either takes as many evaluations, lest what is refused hang on what was asked
     /// before.
     pub fn recall(&self, key: Key, work_out: impl FnOnce(&Key) -> Answer) -> Answer {
+        effort::spend(OF_LOOK);
         let print = key.print(0);
         let known = self.0.borrow().recall(print, &key);
         if let Some((answer, took)) = known {
@@ -129,10 +153,11 @@ mod tests {
             effort::counted(|| memory.recall(number, work_out))
         };
         let kept = u32::try_from(KEPT).unwrap();
+        let took = OF_LOOK + 3;
         effort::within(u64::MAX - 1, || {
-            (0..2 * kept).map(f64::from).for_each(|number| assert_eq!(ask(number), (number, 3)));
+            (0..2 * kept).map(f64::from).for_each(|number| assert_eq!(ask(number), (number, took)));
             assert_eq!(worked.replace(0), 2 * kept);
-            (kept..2 * kept).rev().map(f64::from).for_each(|number| assert_eq!(ask(number), (number, 3)));
+            (kept..2 * kept).rev().map(f64::from).for_each(|number| assert_eq!(ask(number), (number, took)));
             assert_eq!((worked.get(), ask(0.0).0, worked.get()), (0, 0.0, 1));
         });
     }

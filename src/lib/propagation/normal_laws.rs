@@ -7,18 +7,18 @@
 //! half, five places leave 10⁻⁴.
 
 use super::counts::Charge;
-use super::masters::{Dark, Flat, MOST_DARKS};
 use super::memory::Memory;
 use super::node::{Law, Node};
 use super::photosite::Photosite;
 use crate::metadata::PoissonKind;
 use crate::numerics::gauss::{by_recurrence, hermite};
+use crate::numerics::normal::NearlyNormal;
 use crate::stages::noise::{NoiseModel, Tails};
 use nalgebra::DMatrix;
 use std::sync::LazyLock;
 
 /// How exact normal laws stand for a charge.
-struct Wanted {
+struct Exactness {
     /// Places of each sum.
     places: usize,
     /// The skewness of what is summed over.
@@ -29,8 +29,8 @@ struct Wanted {
     hidden_e: f64,
 }
 
-const OF_ALL: Wanted = Wanted { places: MOST_PLACES, skewness: 0.17, most: 0.33, hidden_e: 1.0 };
-const OF_FEW: Wanted = Wanted { places: 5, skewness: 0.37, most: 0.55, hidden_e: 0.6 };
+const OF_ALL: Exactness = Exactness { places: MOST_PLACES, skewness: 0.17, most: 0.33, hidden_e: 1.0 };
+const OF_FEW: Exactness = Exactness { places: 5, skewness: 0.37, most: 0.55, hidden_e: 0.6 };
 
 const MOST_PLACES: usize = 10;
 
@@ -65,27 +65,32 @@ impl Law {
         thread_local! { static KNOWN: Memory<(Law, f64), Option<NormalLaws>> = const { Memory::new() }; }
         let wanted = if self.are_few { OF_FEW } else { OF_ALL };
         let both = [&self.light, &self.dark];
-        let is_counted = |charge: &Charge| charge.shot == Some(PoissonKind::Exact) && charge.shot_std() > 0.0;
         // Where full well cuts off counts that nothing blurs, that they are counted moves a mean by 1/12 of the density there.
         let many = if self.are_few { MANY_IF_FEW_E } else { f64::INFINITY };
         let blur_e = if both.into_iter().all(|charge| charge.rate < many) { noise_e } else { added_e };
         if self.has_floors()
             || both.into_iter().any(|charge| charge.pattern > MOST_PATTERN)
-            || both.into_iter().any(is_counted) && self.least_pattern_std().hypot(blur_e) < wanted.hidden_e
+            || both.into_iter().any(Charge::is_counted) && self.least_pattern_std().hypot(blur_e) < wanted.hidden_e
         {
             return None;
         }
         KNOWN.with(|known| known.recall((*self, noise_e), |(law, noise_e)| law.worked_out(*noise_e, &wanted)))
     }
 
-    fn worked_out(&self, noise_e: f64, wanted: &Wanted) -> Option<NormalLaws> {
+    fn worked_out(&self, noise_e: f64, wanted: &Exactness) -> Option<NormalLaws> {
         // Of many electrons higher cumulants are next to none, and a law so skewed has them: less is asked then.
         const LESS: [f64; 3] = [1.0, 0.8, 0.6];
-        LESS.iter().find_map(|less| self.of_skewness(less * wanted.skewness, noise_e, wanted))
+        let charge = self.cumulants();
+        LESS.iter().find_map(|less| self.of_skewness(less * wanted.skewness, &charge, noise_e, wanted))
     }
 
-    fn of_skewness(&self, skewness: f64, noise_e: f64, wanted: &Wanted) -> Option<NormalLaws> {
-        let charge = self.cumulants();
+    fn of_skewness(
+        &self,
+        skewness: f64,
+        charge: &NearlyNormal,
+        noise_e: f64,
+        wanted: &Exactness,
+    ) -> Option<NormalLaws> {
         let summed = (charge.third.abs() / skewness).powf(2.0 / 3.0);
         if summed <= 0.0 || summed > charge.variance || summed > wanted.most * (charge.variance + noise_e * noise_e) {
             return None;
@@ -112,11 +117,7 @@ impl Photosite {
         /// Of these, normal laws are good to 10⁻⁴ of what they have.
         const FEW: f64 = 0.01;
         let are_few = share <= FEW;
-        let of = |model: NoiseModel| NoiseModel { tails: Tails { are_few, ..model.tails }, ..model };
-        let of_dark = |dark: Dark| Dark { model: of(dark.model), ..dark };
-        let all = |darks: [Option<Dark>; MOST_DARKS]| darks.map(|dark| dark.map(of_dark));
-        let flat = self.flat.map(|flat| Flat { frames: of_dark(flat.frames), darks: all(flat.darks), ..flat });
-        Self { model: of(self.model), darks: all(self.darks), flat, ..*self }
+        self.with_models(|model| NoiseModel { tails: Tails { are_few, ..model.tails }, ..model })
     }
 }
 

@@ -104,6 +104,15 @@ impl Photosite {
         Self { darks, ..self }
     }
 
+    /// The same after what `of` makes of the noise of each frame that its samples follow from.
+    #[must_use]
+    pub(super) fn with_models(&self, of: impl Fn(NoiseModel) -> NoiseModel) -> Self {
+        let of_dark = |dark: Dark| Dark { model: of(dark.model), ..dark };
+        let all = |darks: [Option<Dark>; MOST_DARKS]| darks.map(|dark| dark.map(of_dark));
+        let flat = self.flat.map(|flat| Flat { frames: of_dark(flat.frames), darks: all(flat.darks), ..flat });
+        Self { model: of(self.model), darks: all(self.darks), flat, ..*self }
+    }
+
     /// Sum of the weights of the averages that were subtracted.
     pub(super) fn weight(&self) -> f64 {
         self.darks.iter().flatten().map(|dark| dark.weight).sum()

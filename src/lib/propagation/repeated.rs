@@ -205,13 +205,17 @@ impl Photosite {
     /// Whether they show it where full well, or an end of the codes, cuts off more than next to none.
     fn ends(&self, adc: &AdcRecord, expected_e: f64) -> bool {
         const NEXT_TO_NONE: f64 = 1e-7;
-        let are_few = self.is_rare || self.model.tails.are_few;
-        if are_few || Dark::mean_of(self.model, 1).std_codes(adc, expected_e) >= VISIBLE_AT_ENDS {
+        if self.is_rare || self.model.tails.are_few {
             return false;
         }
         let law = Law::of(&self.model, expected_e);
+        let is_any_full = || law.reaches_full_well() && law.reaches(law.full_well_e) > NEXT_TO_NONE;
+        if Dark::mean_of(self.model, 1).std_codes(adc, expected_e) >= VISIBLE_AT_ENDS {
+            // Of full photosites nothing but read noise is drawn anew.
+            return adc.adu_per_e * self.model.read_noise() < VISIBLE && is_any_full();
+        }
         let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
-        law.reaches_full_well() && law.reaches(law.full_well_e) > NEXT_TO_NONE
+        is_any_full()
             || !law.is_within(adc)
                 && (law.is_read_from(upper) > NEXT_TO_NONE || law.is_read_from(lower) < 1.0 - NEXT_TO_NONE)
     }

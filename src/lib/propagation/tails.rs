@@ -17,7 +17,6 @@ use super::charge::charge;
 use super::effort;
 use super::law::Law;
 use super::line_means::Kinds;
-use super::masters::{Dark, Flat, MOST_DARKS};
 use super::memory::Memory;
 use super::mixture::mixture;
 use super::moments::{Equations, Prediction};
@@ -150,10 +149,7 @@ impl Photosite {
 
     /// The same photosites, those of one kind.
     pub(super) fn at(&self, state: &State) -> Self {
-        let of = |dark: Dark| Dark { model: dark.model.at(state), ..dark };
-        let all = |darks: [Option<Dark>; MOST_DARKS]| darks.map(|dark| dark.map(of));
-        let flat = self.flat.map(|flat| Flat { frames: of(flat.frames), darks: all(flat.darks), ..flat });
-        Self { model: self.model.at(state), darks: all(self.darks), flat, ..*self }
+        self.with_models(|model| model.at(state))
     }
 
     /// That of the frames which have it.

@@ -5,12 +5,12 @@ pub(super) const TOO_LONG: &str = "hot pixels or random telegraph signals go ove
                                    of each would take too long";
 
 /// Why nothing is said of offsets beside patterns that take too long.
-pub(super) const OFFSETS_TOO_LONG: &str = "fixed offsets beside patterns of the charge, over codes that show or end, take too many \
-                                           evaluations; give the sensor read noise";
+pub(super) const OFFSETS_TOO_LONG: &str =
+    "fixed offsets beside patterns of the charge, over codes that show or end, take too many evaluations";
 
 /// Why nothing is said of patterns that take too long.
-pub(super) const PATTERNS_TOO_LONG: &str = "patterns of the response and of the dark current, over codes that show or end, take too many \
-                                            evaluations; give the sensor read noise";
+pub(super) const PATTERNS_TOO_LONG: &str =
+    "patterns of the response and of the dark current, over codes that show or end, take too many evaluations";
 
 /// Why nothing is predicted of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

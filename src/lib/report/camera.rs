@@ -1,7 +1,7 @@
 //! Reports of measured cameras: as text, JSON, YAML and Markdown.
 
 use super::camera_defects::{defects_of, outstanding, patterns_of};
-use super::{check_yaml_name, form_of, in_digits, table, unwritable};
+use super::{check_yaml_name, form_of, in_brackets, in_digits, table, unwritable};
 use crate::analysis::photon_transfer::{ClassFindings, Finding, PatternView};
 use crate::error::Result;
 use crate::formats::places::named;
@@ -184,7 +184,7 @@ fn shown(finding: &Finding, Interval { value, low, high }: Interval) -> [String;
 /// What each number is, with its symbol's part of another where it has one.
 fn label(finding: &Finding) -> String {
     let part = finding.what.starts_with("of ");
-    let unit = if finding.unit.is_empty() { String::new() } else { format!(" [{}]", finding.unit) };
+    let unit = in_brackets(&finding.unit);
     if part { format!("  {}{unit}", finding.what) } else { format!("{}{unit}", finding.what) }
 }
 

@@ -98,8 +98,11 @@ pub fn sensor_of(camera: &MeasuredCamera) -> Result<Sensor> {
             let reached = (reached - bias_adu.value).max(0.0) / gain.value;
             let range = (top - bias_adu.value) / gain.value;
             let why = reason(&camera.classes, "full_well_e");
-            let stands_in = if range > reached { "the range of the converter" } else { "what was reached" };
-            told.tell("full_well_e", Origin::Assumed, format!("{stands_in}; what was reached is {reached:.0}; {why}"));
+            let told_as = match range > reached {
+                true => format!("the range of the converter; what was reached is {reached:.0}; {why}"),
+                false => format!("what was reached; {why}"),
+            };
+            told.tell("full_well_e", Origin::Assumed, told_as);
             reached.max(range)
         }
     };

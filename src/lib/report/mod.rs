@@ -289,11 +289,22 @@ fn shown(key: &str, value: Option<f64>) -> String {
     }
 }
 
+/// A unit behind what it is of; nothing of none.
+pub(super) fn in_brackets(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" [{unit}]") }
+}
+
 fn region_text(region: &RegionReport, out: &mut String) {
     let r = region.region;
     let mut line = format!(
-        "{}x{} at {},{}: {} pixels of {} [{}]",
-        r.width, r.height, r.x, r.y, region.count, region.quantity, region.unit
+        "{}x{} at {},{}: {} pixels of {}{}",
+        r.width,
+        r.height,
+        r.x,
+        r.y,
+        region.count,
+        region.quantity,
+        in_brackets(&region.unit)
     );
     if region.not_finite > 0 {
         let _ = write!(line, ", {} not finite left out", region.not_finite);
@@ -347,12 +358,12 @@ fn patches_text(regions: &[RegionReport], out: &mut String) {
     let (r, count) = (first.region, regions.len());
     let _ = writeln!(
         out,
-        "{count} {}, {}x{} pixels of {} [{}] in each",
+        "{count} {}, {}x{} pixels of {}{} in each",
         if count == 1 { "patch" } else { "patches" },
         r.width,
         r.height,
         first.quantity,
-        first.unit
+        in_brackets(&first.unit)
     );
     let column = |heading: String, cell: &dyn Fn(&RegionReport) -> String| -> Vec<String> {
         std::iter::once(heading).chain(regions.iter().map(cell)).collect()

@@ -1,7 +1,8 @@
 //! Statistics over frames as text, JSON, YAML and CSV.
 
 use super::{
-    ReportFormat, UNIT_COLUMNS, finished, in_form, shown, table, tests_text, unwritable, verdict_cells, verdict_text,
+    ReportFormat, UNIT_COLUMNS, finished, in_brackets, in_form, shown, table, tests_text, unwritable, verdict_cells,
+    verdict_text,
 };
 use crate::analysis::statistics::{RepeatedChannel, RepeatedRegion, RepeatedReport};
 use crate::error::Result;
@@ -103,8 +104,14 @@ fn region_text(frames: u32, region: &RepeatedRegion, out: &mut String) {
     let r = region.region;
     let _ = write!(
         out,
-        "{frames} frames of {}x{} at {},{}: {} pixels of {} [{}]",
-        r.width, r.height, r.x, r.y, region.count, region.quantity, region.unit
+        "{frames} frames of {}x{} at {},{}: {} pixels of {}{}",
+        r.width,
+        r.height,
+        r.x,
+        r.y,
+        region.count,
+        region.quantity,
+        in_brackets(&region.unit)
     );
     if region.left_out > 0 {
         let _ = write!(out, ", {} left out", region.left_out);

@@ -119,14 +119,15 @@ fn cell(value: Option<f64>) -> String {
     value.map_or(String::new(), |value| value.to_string())
 }
 
-/// One row per stage and channel.
+/// One row per stage and channel, the last column why a stage is void.
 fn stages_csv(found: &ChainPrediction) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let causes = found.stages.first().map(|stage| stage.causes.as_slice()).unwrap_or_default();
     let fixed = ["stage", "channel", "unit", "mean", "std", "temporal_std", "fixed_pattern_std", "snr_db"];
     let head = fixed.into_iter().map(str::to_owned);
     let of_causes = causes.iter().map(|entry| format!("variance_{}", entry.cause.name()));
-    writer.write_record(head.chain(["patch_mean_std".to_owned()]).chain(of_causes)).map_err(unwritable)?;
+    let head = head.chain(["patch_mean_std".to_owned()]).chain(of_causes).chain(["void".to_owned()]);
+    writer.write_record(head).map_err(unwritable)?;
     for stage in &found.stages {
         for (i, channel) in stage.channels.iter().enumerate() {
             let numbers = [
@@ -139,13 +140,15 @@ fn stages_csv(found: &ChainPrediction) -> Result<String> {
             ];
             let of_causes = (0..causes.len()).map(|cause| cell(stage.causes.get(cause).map(|entry| entry.variance[i])));
             let words = [stage.stage.name().to_owned(), channel.clone(), stage.unit.clone()];
-            writer.write_record(words.into_iter().chain(numbers.map(cell)).chain(of_causes)).map_err(unwritable)?;
+            let void = stage.void.unwrap_or_default().to_owned();
+            let row = words.into_iter().chain(numbers.map(cell)).chain(of_causes).chain([void]);
+            writer.write_record(row).map_err(unwritable)?;
         }
     }
     finished(writer)
 }
 
-/// One row per scene, `lead` in front.
+/// One row per scene, `lead` in front; the last column names the stages that are void.
 fn scenes_csv<'a>(
     lead: &[&str],
     found: impl Iterator<Item = (Vec<String>, &'a ChainPrediction, Option<[f64; 3]>)> + Clone,
@@ -166,7 +169,8 @@ fn scenes_csv<'a>(
     let head = lead.iter().copied().chain(["electrons_R", "electrons_G", "electrons_B"]).map(str::to_owned);
     let delta_e = first.and_then(|scene| scene.noise_delta_e).map(|_| ["noise_delta_e", "noise_delta_e_std"]);
     let delta_e = delta_e.into_iter().flatten().map(str::to_owned);
-    writer.write_record(head.chain(stages.iter().flat_map(each)).chain(delta_e).chain(own)).map_err(unwritable)?;
+    let head = head.chain(stages.iter().flat_map(each)).chain(delta_e).chain(own).chain(["void".to_owned()]);
+    writer.write_record(head).map_err(unwritable)?;
     for (lead, scene, own) in found {
         let signal = scene.electrons.map(|e| cell(Some(e)));
         let cells = scene.stages.iter().flat_map(|stage| {
@@ -177,7 +181,10 @@ fn scenes_csv<'a>(
         });
         let delta_e = scene.noise_delta_e.map(|found| [found.mean, found.std].map(|value| cell(Some(value))));
         let own = own.into_iter().flatten().map(|value| cell(Some(value)));
+        let void = scene.stages.iter().filter(|stage| stage.void.is_some()).map(|stage| stage.stage.name());
+        let void = void.collect::<Vec<_>>().join(" ");
         let row = lead.into_iter().chain(signal).chain(cells).chain(delta_e.into_iter().flatten()).chain(own);
+        let row = row.chain([void]);
         writer.write_record(row).map_err(unwritable)?;
     }
     finished(writer)

@@ -7,11 +7,13 @@ use crate::analysis::comparison::{Comparison, ComparisonSettings, Side};
 use crate::analysis::statistics::Region;
 use crate::color::{Space, White, chromaticity};
 use crate::error::{Error, Result};
+use crate::formats::format::SampleType;
 use crate::formats::input::{FrameReader, InputOptions};
 use crate::formats::pipe;
 use crate::formats::register::check_inputs;
 use crate::metadata::FrameHeader;
 use crate::stream::RowSource;
+use crate::units::QuantityKind;
 use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use std::ffi::OsString;
@@ -45,12 +47,16 @@ impl FrameOrColor {
         *self == Self::Frame("-".into())
     }
 
-    fn open(&self, part: usize, crop: Option<Region>) -> Result<Side<FrameReader>> {
+    fn open(&self, part: usize, crop: Option<Region>, space: Option<Space>) -> Result<Side<FrameReader>> {
         match self {
             Self::Color(color) => Ok(Side::Color(*color)),
             Self::Frame(path) => {
                 let options = InputOptions { path: Some(path.clone()), part, crop, ..InputOptions::default() };
-                FrameReader::open(&options).map(Side::Frame)
+                let reader = FrameReader::open(&options)?;
+                if space.is_none() {
+                    check_no_picture(&reader)?;
+                }
+                Ok(Side::Frame(reader))
             }
         }
     }
@@ -122,7 +128,7 @@ impl ColorPair {
             return Err(Error::Usage("both are colors, of which there are no parts".into()).leave_out(option));
         }
         let settings = ComparisonSettings { space, white, white_luminance };
-        let comparison = Comparison::new(self.a.open(part, crop)?, self.b.open(part, crop)?, &settings)?;
+        let comparison = Comparison::new(self.a.open(part, crop, space)?, self.b.open(part, crop, space)?, &settings)?;
         let mut notes: Vec<Note> = self.doubt_of_negatives().into_iter().collect();
         if comparison.white().is_none() && (white.is_some() || white_luminance.is_some()) {
             let text = "both are L*a*b* already; --white and --white-luminance have no effect";
@@ -151,6 +157,23 @@ impl ColorPair {
         );
         Some(Note::Warning(text))
     }
+}
+
+/// Refuses planes R, G and B of whole numbers that nothing tells anything of: those of pictures are no XYZ.
+fn check_no_picture(reader: &FrameReader) -> Result<()> {
+    let header = reader.header();
+    let is_picture = header.metadata.quantity == QuantityKind::Unspecified
+        && header.leads_with_three_planes()
+        && matches!(reader.sample_type(), Some(SampleType::U8 | SampleType::U16));
+    if !is_picture {
+        return Ok(());
+    }
+    Err(header
+        .refuse(format!(
+            "its samples are {}, as those of pictures, and nothing tells that they are XYZ",
+            reader.stored_as()
+        ))
+        .give(&["space"]))
 }
 
 /// A warning of images whose colors are not in one light: what is white in one has a color in the other.

@@ -12,7 +12,9 @@ use crate::color::temperature::Locus;
 use crate::color::{self, Space, White, rows_of};
 use crate::error::{Error, Result};
 use crate::formats::data;
+use crate::formats::format::SampleType;
 use crate::formats::input::FrameReader;
+use crate::formats::register;
 use crate::metadata::{FrameHeader, Metadata};
 use crate::names::Named;
 use crate::stages::from_xyz::{Adapting, COVARIANCE_LAYER, FromXyz, XyzSettings, layers_of, scene_white};
@@ -163,6 +165,7 @@ impl Conversion {
     /// the scene to adapt from; [`Error::Format`] without the covariances that `sigma` asks for.
     pub fn stage_of_xyz(&self, reader: &mut FrameReader, sigma: bool, holds_layers: bool) -> Result<Option<FromXyz>> {
         if reader.header().metadata.quantity != QuantityKind::Xyz {
+            doubt_of_picture(reader);
             return Ok(None);
         }
         self.white.check()?;
@@ -338,6 +341,20 @@ fn without_exposure(matrix: &CameraMatrix, frame: &FrameHeader) -> Option<(Camer
         frame.name
     );
     Some((relative, Note::Warning(note)))
+}
+
+/// Has the program warn of planes of 8 bits that no program of ours wrote: pictures have such, and mostly not in proportion to light.
+fn doubt_of_picture(reader: &FrameReader) {
+    let header = reader.header();
+    let is_picture = header.metadata.history.is_empty()
+        && header.leads_with_three_planes()
+        && reader.sample_type() == Some(SampleType::U8);
+    if is_picture {
+        register::doubt(format!(
+            "{}: its planes are of 8 bits, as those of pictures, which are gamma-encoded as a rule; they count as linear codes of a camera",
+            header.name
+        ));
+    }
 }
 
 /// The matrix that comes with a frame: that of its sensor, or, where there is none or no exposure to use it with, that of

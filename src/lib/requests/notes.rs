@@ -131,7 +131,9 @@ pub fn of_reader(reader: &FrameReader) -> Vec<Note> {
         let exposure = header.metadata.exposure.filter(|exposure| reader.tagged_exposure() != Some(*exposure));
         doubts = Metadata { exposure, ..header.metadata.clone() }.doubts();
     }
-    let doubts = doubts.into_iter().map(|doubt| format!("{}: {doubt}", header.name));
+    // What is said of a sensor is said where it is read too, and once.
+    let named = |doubt: String| if doubt.starts_with("sensor ") { doubt } else { format!("{}: {doubt}", header.name) };
+    let doubts = doubts.into_iter().map(named);
     remarks.chain(doubts.map(Note::Warning)).chain(of_levels(header)).collect()
 }
 

@@ -43,14 +43,14 @@ impl<S: RowSource> DefectMap<S> {
     }
 
     /// A list of columns and rows on the sensor, `x,y` in each line, or rows and columns where a heading says so, `row,column`, which may
-    /// stand behind `#`; what else follows `#` does not count, nor do photosites that a crop leaves out.
+    /// stand behind `#`; more columns that a heading names do not count, nor what else follows `#`, nor do photosites that a crop leaves out.
     ///
     /// # Errors
     ///
     /// [`Error::Format`] naming the line that is none, and for a heading that does not tell columns from rows.
     pub fn of_list(text: &str, name: &str, frame: &FrameHeader) -> Result<Self> {
         let (mut found, mut outside) = (BTreeSet::new(), BTreeSet::new());
-        let (mut may_be_heading, mut is_by_row) = (true, false);
+        let (mut may_be_heading, mut is_by_row, mut has_more) = (true, false, false);
         for (number, whole) in text.lines().enumerate() {
             let line = whole.split('#').next().unwrap_or_default().trim();
             if line.is_empty() {
@@ -59,6 +59,7 @@ impl<S: RowSource> DefectMap<S> {
                 continue;
             }
             if std::mem::take(&mut may_be_heading) && is_heading(line) {
+                has_more = words(line).count() > 2;
                 is_by_row = begins_with_row(line).ok_or_else(|| {
                     let problem = format!("its heading, `{line}`, does not tell columns from rows");
                     Error::format(
@@ -68,12 +69,13 @@ impl<S: RowSource> DefectMap<S> {
                 })?;
                 continue;
             }
-            let place = line.split_once([',', ' ', '\t', ';']).and_then(|(first, second)| {
-                let [first, second] = [first, second].map(|text| text.trim().parse::<i64>());
-                let place = [first.ok()?, second.ok()?];
-                Some(if is_by_row { [place[1], place[0]] } else { place })
-            });
-            let [x, y] = place.ok_or_else(|| {
+            let place = || {
+                let mut words = words(line);
+                let place = [words.next()?.parse::<i64>().ok()?, words.next()?.parse().ok()?];
+                // What else a heading names tells no place.
+                (has_more || words.next().is_none()).then_some(if is_by_row { [place[1], place[0]] } else { place })
+            };
+            let [x, y] = place().ok_or_else(|| {
                 let number = number + 1;
                 Error::format(
                     name,
@@ -171,7 +173,7 @@ fn is_heading(line: &str) -> bool {
     words(line).all(|word| word.chars().all(|c| c.is_alphabetic() || c == '_'))
 }
 
-/// Whether the first of two words means rows and the second columns; none where they are not one of each.
+/// Whether the first of all words means rows and the second columns; none where they are not one of each.
 fn begins_with_row(line: &str) -> Option<bool> {
     const OF_ROW: [&str; 6] = ["row", "rows", "y", "line", "lines", "y_px"];
     const OF_COLUMN: [&str; 8] = ["column", "columns", "col", "cols", "x", "sample", "samples", "x_px"];
@@ -180,10 +182,8 @@ fn begins_with_row(line: &str) -> Option<bool> {
         OF_ROW.contains(&word.as_str()).then_some(true).or(OF_COLUMN.contains(&word.as_str()).then_some(false))
     };
     let mut meant = words(line).map(is_row);
-    match (meant.next()??, meant.next()??, meant.next()) {
-        (first, second, None) if first != second => Some(first),
-        _ => None,
-    }
+    let [first, second] = [meant.next()??, meant.next()??];
+    (first != second).then_some(first)
 }
 
 /// Adds bits to a mark.

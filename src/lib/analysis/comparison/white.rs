@@ -43,7 +43,7 @@ pub(super) fn space_of(frame: &FrameHeader, stated: Option<Space>) -> Result<Spa
         }
         QuantityKind::Srgb => {
             return Err(frame.refuse(format!(
-                "it holds {holds}, a picture whose colors may be clipped; run `to-xyz --space lab` instead"
+                "it holds {holds}, a picture whose colors may be clipped; compare the frames that it was made of, behind `to-xyz --space lab`"
             )));
         }
         QuantityKind::Luv | QuantityKind::Cct | QuantityKind::LinearSrgb => {

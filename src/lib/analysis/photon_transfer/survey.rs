@@ -80,7 +80,7 @@ pub fn survey_as<S: RowSource>(frames: &mut [S], asked: &Asked) -> Result<Survey
         return Err(header.refuse(format!("{columns}x{rows} photosites are too few for statistics of each class")));
     }
     let geometry = &header.geometry;
-    let step = frames.iter().map(|frame| geometry.band_rows(frame.natural_rows(), 1)).max().unwrap_or(1).max(1);
+    let step = rows_at_once(frames, geometry);
     let rows_from = |first: usize| step.min(geometry.height - first);
     let mut sums = Sums::new(&header, &sites, frames.len(), asked);
     let [mut ahead, mut band] = [Band::new(frames.len()), Band::new(frames.len())];
@@ -101,6 +101,15 @@ pub fn survey_as<S: RowSource>(frames: &mut [S], asked: &Asked) -> Result<Survey
     }
     let (quad, prints) = (quad.means(), prints.finish());
     Ok(Survey { geometry: header.geometry, sites, picture, bits, quad, prints })
+}
+
+/// Rows of each frame that are read at once: of many frames few, which stay in the cache, but no fewer than their files have in one piece.
+fn rows_at_once<S: RowSource>(frames: &[S], geometry: &Geometry) -> usize {
+    /// Samples of all frames together.
+    const CACHED: usize = 1 << 17;
+    let natural = frames.iter().map(RowSource::natural_rows).max().unwrap_or(1);
+    let few = CACHED / (geometry.row_samples() * frames.len()).max(1);
+    geometry.band_rows(natural, 1).min(few.max(natural)).max(1)
 }
 
 /// Rows of all frames.

@@ -45,7 +45,7 @@ impl Checks {
         if are_stored {
             (self.codes, self.levels) = (CodeCheck::of(frame), LevelCheck::of(frame, self.said_black));
             self.top = TopCheck::of(frame).filter(|_| self.tells_top && !is_marked);
-            self.steps = StepCheck::of(frame).filter(|_| !is_marked);
+            self.steps = StepCheck::of(frame).filter(|steps| !is_marked && (self.tells_top || steps.knows_sensor()));
             self.time = TimeCheck::of(frame, is_tagged).filter(|_| self.tells_top);
             self.linear = self.linear_limit.map(|limit| LinearCheck::of(frame, limit));
             self.masked = self.taken_black.take().and_then(|black| MaskedCheck::of(frame, black));

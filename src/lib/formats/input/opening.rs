@@ -112,6 +112,8 @@ pub(super) fn readers_of(head: &[u8], name: &str) -> Result<Readers> {
             format!("; it has {} and no more", counted(head.len() as u64, "bytes"))
         } else if is_text(head) {
             text_hint(name)
+        } else if head.starts_with(b"\x93NUMPY") {
+            "; it is an array of NumPy, a headerless frame behind 128 bytes mostly".into()
         } else {
             String::new()
         };

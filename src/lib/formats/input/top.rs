@@ -61,7 +61,10 @@ impl TopCheck {
         let count: u64 = heaps.iter().map(|(_, count)| count).sum();
         let advice = match (levels, frame.metadata.demosaic.is_some()) {
             (Some([level, ..]), _) => format!("their white level, {level}, is above it"),
-            (None, true) => "nothing marks which pixels used them; EXR would".to_owned(),
+            (None, true) if is_level_known => "the white level that was known marks none of them".to_owned(),
+            (None, true) => {
+                "no white level was known that marks pixels which used them; demosaic with `--white`".to_owned()
+            }
             (None, false) => "no white level tells that they are".to_owned(),
         };
         let text = format!(

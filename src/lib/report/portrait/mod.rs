@@ -247,15 +247,15 @@ fn chromaticity(portrait: &Portrait, region: &RegionReport) -> Option<Panel> {
         let marks = if color == Color::Blue { Marks::Line(points) } else { Marks::Dashed(points) };
         panel.add(name, color, marks);
     }
-    keep_most(&mut panel, &pixels, ranges);
+    end_axes(&mut panel, &pixels, ranges);
     Some(panel)
 }
 
-/// Ends the axes of chromaticities where those of most pixels end, or the ellipses, where a few pixels are far off.
-fn keep_most(panel: &mut Panel, pixels: &[[f64; 2]], ranges: [Option<[f64; 2]>; 2]) {
-    if ranges.iter().all(Option::is_none) {
-        return;
-    }
+/// Ends the axes of chromaticities where those of most pixels end, or the ellipses, where a few pixels are far off; both are of one scale, and
+/// neither is much shorter than the other.
+fn end_axes(panel: &mut Panel, pixels: &[[f64; 2]], ranges: [Option<[f64; 2]>; 2]) {
+    /// A panel of less has no room for its legend and numbers.
+    const LEAST: f64 = 0.7;
     let ellipses: Vec<[f64; 2]> = panel
         .series
         .iter()
@@ -273,7 +273,15 @@ fn keep_most(panel: &mut Panel, pixels: &[[f64; 2]], ranges: [Option<[f64; 2]>; 
         let room = 0.05 * (high - low);
         [low - room, high + room]
     };
-    let [x, y] = [range(0), range(1)];
+    let own = [range(0), range(1)];
+    let longest = own.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
+    let [x, y] = own.map(|[low, high]| {
+        let room = (0.5 * (LEAST * longest - (high - low))).max(0.0);
+        [low - room, high + room]
+    });
+    if longest <= 0.0 {
+        return;
+    }
     let is_within = |pixel: &&[f64; 2]| (x[0]..=x[1]).contains(&pixel[0]) && (y[0]..=y[1]).contains(&pixel[1]);
     let far = pixels.len() - pixels.iter().filter(is_within).count();
     panel.x = panel.x.clone().range(x[0], x[1]);

@@ -5,6 +5,7 @@ use super::super::scatter::Drift;
 use super::{Curve, Datum, Point4, Values};
 use crate::numerics::variance_components::Interval;
 use crate::text::in_digits;
+use std::sync::OnceLock;
 
 /// A black level that drifts by so many codes over all frames is told of.
 const MUCH_DRIFT: f64 = 0.1;
@@ -18,6 +19,35 @@ fn drifting(drift: f64) -> String {
     )
 }
 
+/// What [`Curve::moved`] found, once it was asked for. A copy of a curve begins anew: its numbers may be changed.
+#[derive(Debug, Default)]
+pub(super) struct Remembered(OnceLock<Option<Moved>>);
+
+impl Clone for Remembered {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+/// The values of a curve, and where numbers that were measured are less and more, each by a step.
+#[derive(Debug)]
+struct Moved {
+    values: Values,
+    data: Vec<Nudge>,
+    /// All darks by what black may have drifted.
+    drift: Option<[Option<Values>; 2]>,
+    /// All numbers of photons by what they may be off by together.
+    photons: [Option<Values>; 2],
+}
+
+/// A number that was measured, and the values where it is a step less and more.
+#[derive(Debug)]
+struct Nudge {
+    datum: Datum,
+    step: f64,
+    ends: [Option<Values>; 2],
+}
+
 impl Curve {
     /// Takes in that means of darks drift so from frame to frame, over so many frames.
     pub(super) fn drift_over(&mut self, drift: Drift, frames: usize) {
@@ -29,62 +59,77 @@ impl Curve {
 
     /// The interval of a number that follows from the values, at such confidence; none where it does not follow.
     pub fn interval(&self, of: impl Fn(&Values) -> Option<f64>, confidence: f64) -> Option<Interval> {
-        let value = of(&self.values()?)?;
+        let moved = self.moved.0.get_or_init(|| self.moved()).as_ref()?;
+        let value = of(&moved.values)?;
+        let slope = |ends: &[Option<Values>; 2]| {
+            let [below, above] = ends.map(|values| values.as_ref().and_then(&of).unwrap_or(value));
+            (above - below) / 2.0
+        };
         let (mut variance, mut hidden) = (0.0, 0.0);
-        let mut moved = self.clone();
-        let mut add = |curve: &mut Self, datum: &dyn Fn(&mut Self) -> Option<&mut Datum>| {
-            let Some(Datum { value: at, variance: own, hidden: most }) = datum(curve).copied() else { return };
-            let step = if own > 0.0 { own.sqrt() } else { most };
+        for Nudge { datum, step, ends } in &moved.data {
+            let slope = slope(ends);
+            variance += if datum.variance > 0.0 { slope.powi(2) } else { 0.0 };
+            hidden += (slope / step * datum.hidden).abs();
+        }
+        hidden += moved.drift.as_ref().map_or(0.0, |ends| slope(ends).abs());
+        variance += slope(&moved.photons).powi(2);
+        let Interval { low, high, .. } = Interval::normal(value, variance, confidence);
+        // What rounding hides of one level it may hide of all alike, and no chance makes it less.
+        Some(Interval { value, low: low - hidden, high: high + hidden })
+    }
+
+    /// The values where each number that was measured is moved; none where there are none.
+    fn moved(&self) -> Option<Moved> {
+        let values = self.values()?;
+        let mut curve = self.clone();
+        let mut data = Vec::new();
+        let mut add = |of: &dyn Fn(&mut Self) -> Option<&mut Datum>| {
+            let Some(datum) = of(&mut curve).copied() else { return };
+            let step = if datum.variance > 0.0 { datum.variance.sqrt() } else { datum.hidden };
             if step <= 0.0 {
                 return;
             }
-            let mut ends = [value; 2];
-            for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
-                if let Some(datum) = datum(curve) {
-                    datum.value = at + sign * step;
+            let mut at = |value: f64| {
+                if let Some(datum) = of(&mut curve) {
+                    datum.value = value;
                 }
-                *end = curve.values().as_ref().and_then(&of).unwrap_or(value);
+                curve.values()
+            };
+            let ends = [at(datum.value - step), at(datum.value + step)];
+            if let Some(moved) = of(&mut curve) {
+                *moved = datum;
             }
-            if let Some(datum) = datum(curve) {
-                datum.value = at;
-            }
-            let slope = (ends[1] - ends[0]) / 2.0;
-            variance += if own > 0.0 { slope.powi(2) } else { 0.0 };
-            hidden += (slope / step * most).abs();
+            data.push(Nudge { datum, step, ends });
         };
         for &flat in &self.fitted {
-            add(&mut moved, &|curve| Some(&mut curve.flats[flat].mean));
-            add(&mut moved, &|curve| Some(&mut curve.flats[flat].variance));
-            add(&mut moved, &|curve| curve.flats[flat].photons.as_mut());
+            add(&|curve| Some(&mut curve.flats[flat].mean));
+            add(&|curve| Some(&mut curve.flats[flat].variance));
+            add(&|curve| curve.flats[flat].photons.as_mut());
         }
         for dark in 0..self.darks.len() {
-            add(&mut moved, &|curve| Some(&mut curve.darks[dark].mean));
-            add(&mut moved, &|curve| Some(&mut curve.darks[dark].bent));
-            add(&mut moved, &|curve| Some(&mut curve.darks[dark].variance));
+            add(&|curve| Some(&mut curve.darks[dark].mean));
+            add(&|curve| Some(&mut curve.darks[dark].bent));
+            add(&|curve| Some(&mut curve.darks[dark].variance));
         }
         // All darks are off together, where black drifts from one to the next.
-        if self.dark_drift > 0.0 {
+        let drift = (self.dark_drift > 0.0).then(|| {
             let off = self.places_in_time();
-            let ends = [-1.0, 1.0].map(|sign| {
+            [-1.0, 1.0].map(|sign| {
                 let mut moved = self.clone();
                 for (dark, place) in moved.darks.iter_mut().zip(&off) {
                     dark.mean.value += sign * self.dark_drift * place;
                 }
-                moved.values().as_ref().and_then(&of).unwrap_or(value)
-            });
-            hidden += ((ends[1] - ends[0]) / 2.0).abs();
-        }
+                moved.values()
+            })
+        });
         // All numbers of photons are off alike.
-        let ends = [-1.0, 1.0].map(|sign| {
+        let photons = [-1.0, 1.0].map(|sign| {
             let mut moved = self.clone();
             let scale = 1.0 + sign * self.photon_error;
             moved.flats.iter_mut().filter_map(|flat| flat.photons.as_mut()).for_each(|photons| photons.value *= scale);
-            moved.values().as_ref().and_then(&of).unwrap_or(value)
+            moved.values()
         });
-        variance += ((ends[1] - ends[0]) / 2.0).powi(2);
-        let Interval { low, high, .. } = Interval::normal(value, variance, confidence);
-        // What rounding hides of one level it may hide of all alike, and no chance makes it less.
-        Some(Interval { value, low: low - hidden, high: high + hidden })
+        Some(Moved { values, data, drift, photons })
     }
 
     /// Places of the darks in the order of their times, from −½ of the shortest to ½ of the longest.

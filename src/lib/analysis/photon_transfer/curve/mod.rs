@@ -29,6 +29,7 @@ use super::scatter::{Component, Scatter};
 use super::settings::Settings;
 use crate::numerics::variance_components::Interval;
 use ends::peak;
+use intervals::Remembered;
 use point::{Datum, Point4};
 
 /// The fits end at this share of saturation [EMVA1288, Sec. 6.5].
@@ -86,6 +87,7 @@ pub struct Curve {
     photon_error: f64,
     rounding: f64,
     weights: Weights,
+    moved: Remembered,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -158,6 +160,7 @@ impl Curve {
             photon_error: settings.photon_error,
             rounding,
             weights: Weights::default(),
+            moved: Remembered::default(),
         };
         curve.beneath = curve.flats.iter().map(|flat| curve.beneath(flat)).collect();
         let no_light = |index: usize| curve.no_light(index).map_or(0.0, |[mean, _]| mean);
