@@ -304,6 +304,9 @@ pub struct FlatRecord {
     /// How many rows of cells these are, and how many columns: (Σ n)²/Σ n² of n cells in each.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cell_lines: Option<[f64; 2]>,
+    /// Column and row on the sensor of the corner of its frames, and their width and height.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area: Option<[i64; 4]>,
     /// Whether the metadata of all its frames say that they were lit evenly.
     pub even: bool,
     /// How they were lit, where that is not so.

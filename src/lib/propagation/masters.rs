@@ -214,9 +214,26 @@ pub struct LevelLines {
     pub lines: [f64; 2],
     /// Whether cells are those of a filter array, so that red and blue photosites share none; planes share all.
     pub is_array: bool,
+    /// The first of the rows of the sensor that they are of, and how many; none where that is not recorded.
+    pub rows: Option<[i64; 2]>,
 }
 
 impl LevelLines {
+    /// What is recorded; none where nothing is.
+    fn of(record: &FlatRecord, is_array: bool) -> Option<Self> {
+        let cell = if is_array { 2 } else { 1 };
+        let rows = record.area.map(|[_, first, _, height]| [first, height - height.rem_euclid(cell)]);
+        record.cell_lines.map(|lines| Self { lines, is_array, rows })
+    }
+
+    /// Whether all of its rows count as much: 1 + (their rms difference)² is as many as there are over as many as they count for.
+    pub(super) fn are_rows_even(&self) -> bool {
+        /// The level of rows that differ by 5 % has a drift that is less off.
+        const UNEVEN: f64 = 1.0025;
+        let cells = |[_, rows]: [i64; 2]| if self.is_array { rows as f64 / 2.0 } else { rows as f64 };
+        self.rows.is_some_and(|rows| cells(rows) <= UNEVEN * self.lines[0])
+    }
+
     /// What the means of two classes R, G and B have in common of what each row has by itself (0), or each column (1): Σ w w′ over lines.
     pub(super) fn shared(&self, axis: usize, [k, l]: [usize; 2]) -> f64 {
         let one = self.lines[axis].recip();
@@ -315,7 +332,7 @@ impl Flat {
             levels: (record.levels.len() > 1).then(|| leveled(combine, clip.unwrap_or(CLIP), &record.levels)),
             darks,
             shares_masters: record.shares_masters,
-            level_lines: record.cell_lines.map(|lines| LevelLines { lines, is_array: !are_planes }),
+            level_lines: LevelLines::of(record, !are_planes),
             levels_adu: [0.0, level_adu],
         })
     }

@@ -18,6 +18,7 @@ mod counts;
 pub mod covariance;
 mod curved;
 mod divided;
+mod divided_drift;
 mod divided_kinds;
 mod divided_lines;
 pub mod drift;

@@ -8,7 +8,6 @@ use super::charge;
 use super::covariance::Covariance;
 use super::ground::{corrected, quantity_of_sites};
 use super::level_variance::{HALF_A_CODE, LevelVariance};
-use super::lines::DIVIDED_DRIFT;
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::pixel_gains::{PixelGains, phase_at};
@@ -171,9 +170,8 @@ impl PixelNoise {
         let is_followed = photosite.check_tails([0.0; 3]).and_then(|()| photosite.check_lines(false));
         let light = metadata.correction.as_ref().and_then(|correction| correction.flat.as_ref()?.illumination.as_ref());
         is_followed.and_then(|()| photosite.check_flat_in(light)).map_err(|why| frame.refuse(why.to_string()))?;
-        if photosite.drifts() && photosite.flat.is_some() {
-            return Err(frame.refuse(DIVIDED_DRIFT));
-        }
+        let is_level_told = photosite.check_level_of_drift();
+        is_level_told.map_err(|why| frame.refuse(why.to_string()))?;
         let average = match &metadata.average {
             Some(record) => {
                 let record =

@@ -4,7 +4,7 @@
 //! photosites are groups of known sizes, one for each amplifier, and not drawn among them.
 
 use super::drift;
-use super::moments::{Equations, LineCovariance, Prediction};
+use super::moments::{Equations, LineCovariance, Prediction, common};
 use super::tap_lines::{Lit, TapLines};
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::taps::TapLayout;
@@ -53,6 +53,8 @@ pub struct TappedSites {
     pub lines: Option<Box<TapLines>>,
     /// Where they are.
     pub cells: Cells,
+    /// The covariance of what all samples of R, G and B are off together.
+    pub level: Matrix3<f64>,
 }
 
 /// Photosites by rows and columns that are alike.
@@ -132,6 +134,13 @@ impl Cells {
 }
 
 impl TappedSites {
+    /// The shares of all photosites that are of R, G and B.
+    pub fn shares(&self) -> [f64; 3] {
+        let counts = [0, 1, 2].map(|k| self.groups.iter().map(|group| group.counts[k]).sum::<f64>());
+        let all: f64 = counts.iter().sum();
+        counts.map(|count| if all > 0.0 { count / all } else { 0.0 })
+    }
+
     fn share(&self, group: usize, class: usize) -> f64 {
         let all: f64 = self.groups.iter().map(|group| group.counts[class]).sum();
         if all > 0.0 { self.groups[group].counts[class] / all } else { 0.0 }
@@ -380,10 +389,20 @@ pub(super) fn sites(
     let moments: Vec<[Prediction; 3]> = groups.iter().map(|group| group.sites).collect();
     let is_shared = moments.iter().flatten().any(|site| site.lines != LineCovariance::default());
     let lines = if is_shared { TapLines::of(&lit, &moments, average.as_ref())? } else { None };
-    Ok(Some(TappedSites { groups, lines: lines.map(Box::new), cells }))
+    let level = level(&groups);
+    Ok(Some(TappedSites { groups, lines: lines.map(Box::new), cells, level }))
 }
 
-/// Photosites of a frame that one amplifier reads, of such moments, as one group; none where they do not follow what they share on a curve.
+/// The covariance of what all samples of R, G and B are off together, of photosites of one group; several have none.
+pub(super) fn level(groups: &[Group]) -> Matrix3<f64> {
+    match groups {
+        [one] => common(&one.sites),
+        _ => Matrix3::zeros(),
+    }
+}
+
+/// Photosites of a frame that one amplifier reads, of such moments, as one group; none where they do not follow what they share on a curve,
+/// unless `always`.
 ///
 /// # Errors
 ///
@@ -393,12 +412,15 @@ pub(super) fn one_group(
     lit: &Lit,
     sites: [Prediction; 3],
     average: Option<&AverageRecord>,
+    always: bool,
 ) -> Predicted<Option<TappedSites>> {
-    let lines = TapLines::of(std::slice::from_ref(lit), &[sites], average)?.filter(TapLines::are_bent);
+    let lines = TapLines::of(std::slice::from_ref(lit), &[sites], average)?;
+    let lines = lines.filter(|lines| always || lines.are_bent());
     let (Some(lines), Some((_, cells))) = (lines, all_cells(frame)) else { return Ok(None) };
     let count = |class: Class| cells.all.iter().filter(|cell| cell.has(class)).map(|cell| cells.count(cell)).sum();
     let groups = vec![Group { counts: Class::ALL.map(count), sites }];
-    Ok(Some(TappedSites { groups, lines: Some(Box::new(lines)), cells }))
+    let level = level(&groups);
+    Ok(Some(TappedSites { groups, lines: Some(Box::new(lines)), cells, level }))
 }
 
 /// Mean, variance and third cumulant of photosites of groups taken together, by classes; their excess kurtosis is what they have on

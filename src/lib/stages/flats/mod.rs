@@ -381,6 +381,7 @@ impl<S: RowSource> FlatFrames<S> {
             photosites: means.photosites.clone(),
             left_out: means.left_out.clone(),
             cell_lines: means.cell_lines,
+            area: Some(self.head.geometry.on_sensor()),
             even: self.is_even,
             illumination: (!self.is_even).then(|| means.illumination.clone()),
             exposure_s: metadata.time_s(),
