@@ -5,6 +5,7 @@
 use crate::support;
 use cyanometer::analysis::statistics::{Region, Saturated, measure};
 use cyanometer::camera::readout::ReadOut;
+use cyanometer::camera::taps::{TapLayout, Taps};
 use cyanometer::cfa::CfaPattern;
 use cyanometer::color::Space;
 use cyanometer::frame::Geometry;
@@ -21,7 +22,7 @@ use rayon::prelude::*;
 use support::alarms::{judge, over_seeds};
 use support::chain::{colored, demosaicked};
 use support::kit::{Camera, Chance, Kit};
-use support::through;
+use support::{at, through};
 
 const STAGES: [&str; 7] = ["three planes", "CFA plane", "a region", "BI", "ECI", "MHC", "XYZ"];
 
@@ -183,6 +184,33 @@ fn drifting(chance: &mut Chance, readout: &mut ReadOut) {
     readout.black_drift_rows = 2.0 * 60.0_f64.powf(chance.next());
 }
 
+/// Amplifiers that differ in everything, of a sensor of such a size, beside noise of rows and a drift of these, or not.
+fn tapped(size: [u32; 2]) -> impl Fn(&mut Chance, &mut ReadOut) + Sync {
+    move |chance, readout| {
+        match chance.whole(0, 2) {
+            0 => {}
+            1 => noisy_lines(chance, readout),
+            _ => drifting(chance, readout),
+        }
+        let (layout, count) = [
+            (TapLayout::Columns, 2),
+            (TapLayout::Columns, 3),
+            (TapLayout::LeftRight, 2),
+            (TapLayout::TopBottom, 2),
+            (TapLayout::Quadrants, 4),
+        ][chance.whole(0, 4)];
+        let mut some = |low: f64, high: f64| (0..count).map(|_| chance.between(low, high)).collect();
+        let least = 1.2 / readout.adu_per_e;
+        readout.taps = Some(Taps {
+            layout,
+            gain: some(0.85, 1.15),
+            offset_e: some(-60.0, 60.0),
+            read_noise_e: some(least, 3.0 * least),
+        });
+        (readout.width, readout.height) = (size[0], size[1]);
+    }
+}
+
 /// Rows and columns whose gains move the level of a frame by more than all of its noise.
 fn gained_lines(chance: &mut Chance, readout: &mut ReadOut) {
     (readout.prnu_row, readout.prnu_column) = (chance.between(0.002, 0.006), chance.between(0.002, 0.006));
@@ -263,7 +291,7 @@ fn noise_of_rows_and_columns_is_predicted() {
 
 #[test]
 fn drifts_are_predicted() {
-    check(8, [60, 48], drifting);
+    check(8, [70, 50], drifting);
 }
 
 /// Checks call frames wrong as often as the level says, of few rows and of the whole frame, by smooth hue transition too.
@@ -286,10 +314,24 @@ fn drifts_raise_false_alarms_at_the_stated_rate() {
 #[test]
 fn sigma_of_drifts_covers() {
     let places = [[0, 0], [7, 1], [8, 8], [3, 13], [16, 15]];
-    for rows in [3.0, 11.0, 60.0] {
+    let halves = |layout, count: usize| Taps {
+        layout,
+        gain: vec![1.0, 1.08, 0.93, 1.04][..count].to_vec(),
+        offset_e: vec![3.0, -20.0, 11.0, 0.0][..count].to_vec(),
+        read_noise_e: vec![8.0, 14.0, 25.0, 6.0][..count].to_vec(),
+    };
+    let cases = [
+        (3.0, None),
+        (11.0, None),
+        (60.0, None),
+        (11.0, Some(halves(TapLayout::Columns, 3))),
+        (60.0, Some(halves(TapLayout::Quadrants, 4))),
+    ];
+    for (rows, taps) in cases {
         let drift = |readout: &mut ReadOut| {
             (readout.dcnu, readout.prnu, readout.read_noise_e) = (0.05, 0.005, 8.0);
             (readout.black_drift_e, readout.black_drift_rows) = (60.0, rows);
+            (readout.width, readout.height, readout.taps) = (18, 16, taps.clone());
         };
         let electrons = [3000.0, 9000.0, 5000.0];
         let made = |seed: u64| {
@@ -309,7 +351,7 @@ fn sigma_of_drifts_covers() {
         let noise = PixelNoise::of(&all[0].header).unwrap();
         let mut smallest = 1.0_f64;
         for [x, y] in places {
-            let of = |c: usize| all.iter().map(move |frame| f64::from(frame.samples[(18 * y + x) * 3 + c]));
+            let of = |c: usize| all.iter().map(move |frame| f64::from(at(frame, x, y, c)));
             let n = cameras as f64;
             let means = [0, 1, 2].map(|c| of(c).sum::<f64>() / n);
             let predicted = symmetric(&noise.covariance([x, y], means).0);
@@ -321,6 +363,32 @@ fn sigma_of_drifts_covers() {
             }
         }
         assert!(of_smallest(smallest, 3 * places.len()) > 1e-4, "{rows}: {smallest}");
+    }
+}
+
+#[test]
+fn taps_are_predicted() {
+    check(10, [70, 50], tapped([70, 50]));
+}
+
+/// So do frames of several amplifiers, of their parts behind one and behind all.
+#[test]
+fn taps_raise_false_alarms_at_the_stated_rate() {
+    let parts = [
+        Region { x: 0, y: 0, width: 26, height: 20 },
+        Region { x: 3, y: 5, width: 19, height: 12 },
+        Region { x: 1, y: 1, width: 9, height: 7 },
+    ];
+    let change = tapped([26, 20]);
+    let made = |seed: u64| {
+        let [planes, plane] =
+            [false, true].map(|is_plane| plane(&bench(seed + 1, [26, 20], is_plane, &change).frame()));
+        let [hue, pixels] = [Method::SmoothHue, Method::Malvar].map(|method| demosaicked(&plane, method));
+        let xyz = colored(&pixels, Space::Xyz);
+        vec![planes, plane, hue, pixels, xyz]
+    };
+    for (index, corrected) in over_seeds(60, &parts, made).iter().enumerate() {
+        judge(&format!("taps over flats, {index}"), corrected, 0.0);
     }
 }
 

@@ -35,12 +35,11 @@ const UNRECORDED: &str = "it was divided by a flat field whose rows or columns s
 const GAINS: &str = "it was divided by a flat field, and rows or columns differ so much in response that the noise of photosites does from one to \
                      the next; how far the variance of a frame scatters by that is not predicted";
 
-/// What a line adds: to the readings of a frame, to those of the flat field, and to the response.
+/// What a line adds to the readings of a frame, to those of the flat field, and to the response, and what R, G and B have of these.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Added {
     covariance: Matrix3<f64>,
     of_lines: [Vector3<f64>; 3],
-    of_level: [Vector3<f64>; 3],
 }
 
 impl Added {
@@ -129,12 +128,10 @@ impl Photosite {
         let mut sum = [[0.0; 3]; 3];
         let Some(flat) = self.flat.filter(|_| self.has_lines()) else { return sum };
         let Some(level_lines) = flat.level_lines else { return sum };
+        let ratios = self.ratios(expected_e);
         for (index, axis) in Axis::ALL.into_iter().enumerate() {
-            let Some(Added { mut covariance, of_lines, of_level }) = self.added_by(axis, expected_e) else { continue };
-            if axis == Axis::Row {
-                let [of_frame, of_both, of_flat] = self.drift_terms(None);
-                covariance -= Matrix3::new(of_frame, of_both, 0.0, of_both, of_flat, 0.0, 0.0, 0.0, 0.0);
-            }
+            let Some((covariance, of_lines)) = self.line_parts(axis, expected_e) else { continue };
+            let of_level = [0, 1, 2].map(|k| Vector3::new(0.0, ratios[k], ratios[k] * flat.expected_e[k]));
             let between = |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(&(covariance * b));
             for (k, row) in sum.iter_mut().enumerate() {
                 for (l, sum) in row.iter_mut().enumerate() {
@@ -146,6 +143,17 @@ impl Photosite {
             }
         }
         sum
+    }
+
+    /// The covariance of what a line adds to a frame, to its flat field and to the response of both, the drift of rows apart, and what R, G and
+    /// B have of these before the slope.
+    pub(super) fn line_parts(&self, axis: Axis, expected_e: [f64; 3]) -> Option<(Matrix3<f64>, [Vector3<f64>; 3])> {
+        let Added { mut covariance, of_lines, .. } = self.added_by(axis, expected_e)?;
+        if axis == Axis::Row {
+            let [of_frame, of_both, of_flat] = self.drift_terms(None);
+            covariance -= Matrix3::new(of_frame, of_both, 0.0, of_both, of_flat, 0.0, 0.0, 0.0, 0.0);
+        }
+        Some((covariance, of_lines))
     }
 
     /// x of R, G and B: what is left of codes over the flat field; none of what was not divided.
@@ -179,7 +187,6 @@ impl Photosite {
                 response * response,
             ),
             of_lines: [0, 1, 2].map(|k| Vector3::new(1.0, -ratio(k), expected_e[k] - ratio(k) * flat.expected_e[k])),
-            of_level: [0, 1, 2].map(|k| Vector3::new(0.0, ratio(k), ratio(k) * flat.expected_e[k])),
         })
     }
 }
@@ -235,6 +242,7 @@ mod tests {
             darks: [Some(bias), None, None],
             shares_masters: false,
             level_lines: Some(LevelLines { lines: [80.0, 60.0], is_array: false, rows: Some([0, 80]) }),
+            ratios: [1.0; 3],
             levels_adu: [0.0; 2],
         };
         let site = Photosite::of_electrons(model, Equations::Exact).digitized(AdcRecord::new(14, 600.0, 0.25));

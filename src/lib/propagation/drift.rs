@@ -151,6 +151,19 @@ impl KnotMeans {
         }
     }
 
+    /// Of rows of the sensor, from the first on, of which the mean has such shares.
+    pub fn of_shares(first: i64, shares: &[f64], rows_per_knot: f64) -> Self {
+        let base = knots(first, rows_per_knot).0;
+        let mut means = Vec::new();
+        for (index, share) in shares.iter().enumerate() {
+            let (knot, parts) = knots(first + index as i64, rows_per_knot);
+            let place = usize::try_from(knot - base).unwrap_or_default();
+            means.resize((place + 2).max(means.len()), 0.0);
+            (0..2).for_each(|part| means[place + part] += share * parts[part]);
+        }
+        Self { first: base, means }
+    }
+
     /// Of a knot.
     pub fn at(&self, knot: i64) -> f64 {
         let place = usize::try_from(knot - self.first).ok();

@@ -15,6 +15,7 @@ use super::spaces::{Channels, Curved, OTHER_COLORS, is_curved, white};
 use super::tails;
 use super::tap_lines::{Lit, TapLines};
 use super::tapped::{TapMoments, TappedPixels};
+use super::tapped_flat;
 use super::taps::{self, Group, TappedSites};
 use super::unpredictable::{OFFSETS_TOO_LONG, TOO_LONG};
 pub use super::unpredictable::{Predicted, Unpredictable};
@@ -218,9 +219,13 @@ impl Sites {
                 return Err(Unpredictable::Beyond("charge transfer before rows and columns that share noise"));
             }
             moments.iter_mut().zip(lines).for_each(|(moments, lines)| moments.lines = lines);
+            // What several amplifiers make of a level is told of all together.
+            let is_of_one = frame.metadata.correction.as_ref().and_then(|correction| correction.flat.as_ref());
+            let is_of_one = is_of_one.is_none_or(|flat| flat.converters.is_empty());
             let levels = [photosite.level_covariance(expected_e), photosite.level_of_drift(expected_e, frame)];
             for (k, moments) in moments.iter_mut().enumerate() {
-                moments.lines.level = [0, 1, 2].map(|l| levels[0][k][l] + levels[1][k][l]);
+                moments.lines.level =
+                    [0, 1, 2].map(|l| if is_of_one { levels[0][k][l] + levels[1][k][l] } else { 0.0 });
             }
             if frame.geometry.channels.len() == 3 && frame.metadata.demosaic.is_none() {
                 let beyond = photosite.beyond_lines(expected_e, &lines)?;
@@ -411,9 +416,6 @@ fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> 
     if equations == Equations::Paper {
         return beyond(OF_ONE);
     }
-    if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
-        return beyond(taps::FLATTENED);
-    }
     pixels_by_place(frame, equations)
 }
 
@@ -439,6 +441,12 @@ fn pixels_by_place(frame: &FrameHeader, equations: Equations) -> Predicted<Tappe
     let lines = if is_shared { TapLines::of(&lit, &moments, average.as_ref())? } else { None };
     let black = subtracted(record.black, record.black_deltas)?;
     let channels = Channels::of(metadata, quantity_of_sites(frame))?;
-    let level = taps::level(&groups.iter().map(|(_, group)| *group).collect::<Vec<_>>());
+    let level = match tapped_flat::flat_of(frame).filter(|_| frame.taps().is_some()) {
+        Some(flat) => taps::level_of_flat(frame, flat, |frame| {
+            let sites = Sites::of(frame, equations)?;
+            Ok((sites.lit(), sites.moments))
+        })?,
+        None => taps::level(&groups.iter().map(|(_, group)| *group).collect::<Vec<_>>()),
+    };
     Ok(TappedPixels::of(frame, &channels, black, &groups, lines.as_ref())?.with_level(&level))
 }

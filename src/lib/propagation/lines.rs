@@ -205,14 +205,14 @@ impl Photosite {
     /// As [`Self::lines`].
     pub(super) fn line_slopes(&self, expected_e: [f64; 3]) -> Predicted<Option<[[f64; 3]; 2]>> {
         let regime = self.regime(expected_e)?;
-        if self.has_tails() && regime != Regime::Curved {
-            return self.slopes_of_unlike(expected_e).map(Some);
-        }
-        Ok(match regime {
+        let found = match regime {
+            Regime::Curved => None,
+            _ if self.has_tails() => Some(self.slopes_of_unlike(expected_e)?),
             Regime::Straight => Some([[self.slope(); 3]; 2]),
             Regime::OnAverage => Some([expected_e.map(|expected_e| self.mean_slope(expected_e)); 2]),
-            Regime::Curved => None,
-        })
+        };
+        let scales = self.flat.map_or([1.0; 3], |flat| flat.ratios);
+        Ok(found.map(|slopes| slopes.map(|slopes| [0, 1, 2].map(|k| scales[k] * slopes[k]))))
     }
 
     /// The same photosites over exposures: their means, in which all that rows and columns have anew is noise like that of their own.

@@ -53,20 +53,23 @@ impl PixelLines {
         }
     }
 
-    /// What photosites share at levels above black.
-    pub fn at(&self, level: [f64; 3]) -> AtLevel {
+    /// What photosites share at levels of codes above black, where such a share of light fell on the flat field.
+    pub fn at(&self, level: [f64; 3], share: f64) -> AtLevel {
         let full_well_e = self.photosite.model.full_well_e;
         // `max` drops what is no number.
-        let expected_e = level.map(|level| self.photosite.expected_at(level.max(0.0)).max(0.0).min(full_well_e));
-        let x = self.photosite.line_signals(expected_e);
+        let expected_e = [0, 1, 2].map(|k| self.photosite.expected_of(k, level[k].max(0.0)).max(0.0).min(full_well_e));
+        let is_divided = self.photosite.flat.is_some();
+        let x = self.photosite.line_signals(expected_e).map(|signal| if is_divided { signal / share } else { signal });
         let dark_e = self.photosite.model.dark_e;
-        let slopes = expected_e.map(|e| self.photosite.adc.map_or(1.0, |adc| adc.sample_per_e(e + dark_e)));
+        let of_codes = |e: f64| self.photosite.adc.map_or(1.0, |adc| adc.sample_per_e(e + dark_e));
+        let scales = self.photosite.flat.map_or([1.0; 3], |flat| flat.ratios);
+        let slopes: [f64; 3] = std::array::from_fn(|k| scales[k] * of_codes(expected_e[k]));
         let shared = std::array::from_fn(|index| {
             let [k, l] = PAIRS[index % PAIRS.len()];
             slopes[k] * slopes[l] * self.terms[index / PAIRS.len()].at(x[k], x[l])
         });
         let ratios = self.photosite.ratios(expected_e);
-        let of_rows = self.photosite.drift_loads(ratios, slopes, self.average.as_ref());
+        let of_rows = self.photosite.drift_loads(ratios.map(|ratio| ratio / share), slopes, self.average.as_ref());
         let drift = DriftLoads { of_rows, of_level: self.photosite.level_loads(ratios, slopes) };
         AtLevel { shared, drift }
     }

@@ -99,7 +99,11 @@ impl TapLines {
         if let Some(record) = average {
             let one = sites.iter().map(|(photosite, expected_e)| (photosite.one_exposure(), *expected_e));
             let one: Vec<Lit> = one.collect();
-            let temporal = shared(&one)?.into_iter().zip(fixed(&one)?).map(|(whole, fixed)| whole - fixed);
+            let scale = |place: usize| sites[place / 3].0.flat.map_or(1.0, |flat| flat.ratios[place % 3]);
+            let of_samples = |anew: DMatrix<f64>| {
+                DMatrix::from_fn(anew.nrows(), anew.ncols(), |a, b| scale(a) * scale(b) * anew[(a, b)])
+            };
+            let temporal = shared(&one)?.into_iter().zip(fixed(&one)?).map(|(whole, fixed)| of_samples(whole - fixed));
             let off = 1.0 - 1.0 / f64::from(record.frames.max(1));
             whole.iter_mut().zip(temporal).for_each(|(whole, temporal)| *whole -= off * temporal);
         }
