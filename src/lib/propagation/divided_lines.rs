@@ -200,10 +200,11 @@ fn left_e(model: &NoiseModel, darks: &[Option<Dark>; MOST_DARKS], level_e: f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metadata::{AdcRecord, PoissonKind};
+    use crate::metadata::{AdcRecord, FrameHeader, Metadata, PoissonKind};
     use crate::propagation::masters::{Flat, LevelLines};
     use crate::propagation::moments::Equations;
     use crate::stages::noise::{LineNoise, Tails};
+    use crate::units::QuantityKind;
 
     const LINES: LineNoise = LineNoise {
         row_noise_e: 7.0,
@@ -265,6 +266,21 @@ mod tests {
                 let found = square * (row[(k, l)] / 80.0 + column[(k, l)] / 60.0) + level[k][l];
                 assert!((found / expected - 1.0).abs() < 1e-9, "{k} {l}: {found} {expected}");
             }
+        }
+    }
+
+    /// Of a drift that is one number of a frame nothing of the flat field is left in the mean of the frame, between all classes: K² d² (1 + 1/5).
+    #[test]
+    fn slow_drifts_of_flats_cancel() {
+        let site = divided(LineNoise { black_drift_e: 6.0, black_drift_rows: 1e9, ..LineNoise::default() });
+        let geometry = Geometry::new(60, 80, &["R", "G", "B"]);
+        let frame = FrameHeader { name: "test".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+        let level = site.level_of_drift(LIGHT, &frame);
+        let loads = site.drift_loads(site.ratios(LIGHT), [0.25; 3], None);
+        let expected = 0.25 * 0.25 * 1.2 * 36.0;
+        for (k, l) in (0..9).map(|pair| (pair / 3, pair % 3)) {
+            let found = loads[k][0] * loads[l][0] + loads[k][1] * loads[l][1] + level[k][l];
+            assert!((found / expected - 1.0).abs() < 1e-6, "{k} {l}: {found} {expected}");
         }
     }
 
