@@ -1,7 +1,8 @@
 //! What the pixels of a rectangle have together of each knot of a drift of the black level.
 //!
-//! Pixel a has V_i(a; m) of the number m: a knot has one, or where a flat field divided them as many as [`NUMBERS`], one after another. With g = Σ_a V(a), and T_ij(m, m′) = Σ_a V_i(a; m) V_j(a; m′), which has a few diagonals, two pixels
-//! have the covariance D_ij(a, b) = Σ_m V_i(a; m) V_j(b; m), and
+//! Pixel a has V_i(a; m) of the number m: a knot has one, or where a flat field divided them as many as [`NUMBERS`], one after another. With
+//! g = Σ_a V(a), and T_ij(m, m′) = Σ_a V_i(a; m) V_j(a; m′), which has a few diagonals, two pixels have the covariance
+//! D_ij(a, b) = Σ_m V_i(a; m) V_j(b; m), and
 //!
 //! - Σ_a D(a, a) = Σ_m T(m, m),  Σ_ab D = g gᵀ
 //! - Σ_ab D_ik D_jl = Σ_mm′ T_ij(m, m′) T_kl(m, m′)
