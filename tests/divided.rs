@@ -5,19 +5,24 @@
 use crate::support;
 use cyanometer::analysis::statistics::{Region, Saturated, measure};
 use cyanometer::camera::readout::ReadOut;
+use cyanometer::camera::taps::{TapLayout, Taps};
 use cyanometer::cfa::CfaPattern;
 use cyanometer::color::Space;
 use cyanometer::frame::Geometry;
-use cyanometer::metadata::FrameHeader;
+use cyanometer::metadata::{FlatRecord, FrameHeader};
+use cyanometer::numerics::significance::{of_chi_square, of_smallest};
+use cyanometer::propagation::covariance::symmetric;
+use cyanometer::propagation::pixels::PixelNoise;
 use cyanometer::propagation::{Equations, of_frame};
 use cyanometer::sigma::WithSigma;
 use cyanometer::stages::black::Black;
 use cyanometer::stages::demosaic::{Demosaic, Method};
 use cyanometer::stream::MemoryFrame;
 use rayon::prelude::*;
+use support::alarms::{judge, over_seeds};
 use support::chain::{colored, demosaicked};
 use support::kit::{Camera, Chance, Kit};
-use support::through;
+use support::{at, through};
 
 const STAGES: [&str; 7] = ["three planes", "CFA plane", "a region", "BI", "ECI", "MHC", "XYZ"];
 
@@ -172,6 +177,40 @@ fn noisy_lines(chance: &mut Chance, readout: &mut ReadOut) {
     readout.read_noise_e = readout.read_noise_e.max(1.0 / readout.adu_per_e);
 }
 
+/// A black level that drifts over few rows or many, beside noise of rows and offsets.
+fn drifting(chance: &mut Chance, readout: &mut ReadOut) {
+    noisy_lines(chance, readout);
+    readout.black_drift_e = chance.between(5.0, 60.0);
+    readout.black_drift_rows = 2.0 * 60.0_f64.powf(chance.next());
+}
+
+/// Amplifiers that differ in everything, of a sensor of such a size, beside noise of rows and a drift of these, or not.
+fn tapped(size: [u32; 2]) -> impl Fn(&mut Chance, &mut ReadOut) + Sync {
+    move |chance, readout| {
+        match chance.whole(0, 2) {
+            0 => {}
+            1 => noisy_lines(chance, readout),
+            _ => drifting(chance, readout),
+        }
+        let (layout, count) = [
+            (TapLayout::Columns, 2),
+            (TapLayout::Columns, 3),
+            (TapLayout::LeftRight, 2),
+            (TapLayout::TopBottom, 2),
+            (TapLayout::Quadrants, 4),
+        ][chance.whole(0, 4)];
+        let mut some = |low: f64, high: f64| (0..count).map(|_| chance.between(low, high)).collect();
+        let least = 1.2 / readout.adu_per_e;
+        readout.taps = Some(Taps {
+            layout,
+            gain: some(0.85, 1.15),
+            offset_e: some(-60.0, 60.0),
+            read_noise_e: some(least, 3.0 * least),
+        });
+        (readout.width, readout.height) = (size[0], size[1]);
+    }
+}
+
 /// Rows and columns whose gains move the level of a frame by more than all of its noise.
 fn gained_lines(chance: &mut Chance, readout: &mut ReadOut) {
     (readout.prnu_row, readout.prnu_column) = (chance.between(0.002, 0.006), chance.between(0.002, 0.006));
@@ -185,7 +224,11 @@ fn gained_lines(chance: &mut Chance, readout: &mut ReadOut) {
 /// standard deviations by a twentieth.
 #[test]
 fn layers_of_sigma_are_as_predicted() {
-    let changes: [fn(&mut Chance, &mut ReadOut); 2] = [tailed, noisy_lines];
+    let briefly = |chance: &mut Chance, readout: &mut ReadOut| {
+        noisy_lines(chance, readout);
+        (readout.black_drift_e, readout.black_drift_rows) = (chance.between(5.0, 40.0), 2.0);
+    };
+    let changes: [fn(&mut Chance, &mut ReadOut); 3] = [tailed, noisy_lines, briefly];
     let mut told = 0;
     for (seed, change) in (1..=4).flat_map(|seed| changes.map(|change| (seed, change))) {
         let plane = plane(&bench(seed, [60, 48], true, change).frame());
@@ -202,7 +245,7 @@ fn layers_of_sigma_are_as_predicted() {
             }
         }
     }
-    assert!(told >= 36, "{told}");
+    assert!(told >= 54, "{told}");
 }
 
 /// What is not predicted is refused by name.
@@ -223,8 +266,14 @@ fn what_is_beyond_is_named() {
     let unrecorded = why([20, 16], &rows, &before);
     assert!(unrecorded.contains("correct the frame anew"), "{unrecorded}");
     let drift = |readout: &mut ReadOut| (readout.black_drift_e, readout.black_drift_rows) = (3.0, 20.0);
-    let by_drift = why([20, 16], &drift, &as_it_is);
-    assert!(by_drift.contains("how far that moves its level"), "{by_drift}");
+    assert_eq!(why([20, 16], &drift, &as_it_is), "predicted");
+    let flat = |frame: &mut MemoryFrame, change: fn(&mut FlatRecord)| {
+        change(frame.header.metadata.correction.as_mut().unwrap().flat.as_mut().unwrap());
+    };
+    let unplaced = why([20, 16], &drift, &|frame| flat(frame, |flat| flat.area = None));
+    assert!(unplaced.contains("correct the frame anew"), "{unplaced}");
+    let uneven = why([20, 16], &drift, &|frame| flat(frame, |flat| flat.cell_lines = Some([7.5, 10.0])));
+    assert!(uneven.contains("so many photosites are defective"), "{uneven}");
     let gains = |readout: &mut ReadOut| (readout.prnu_column, readout.read_noise_e) = (0.05, 200.0);
     let by_gains = why([20, 200], &gains, &as_it_is);
     assert!(by_gains.contains("differ so much in response"), "{by_gains}");
@@ -238,6 +287,143 @@ fn what_is_beyond_is_named() {
 #[test]
 fn noise_of_rows_and_columns_is_predicted() {
     check(8, [120, 100], noisy_lines);
+}
+
+#[test]
+fn drifts_are_predicted() {
+    check(8, [70, 50], drifting);
+}
+
+/// Checks call frames wrong as often as the level says, of few rows and of the whole frame, by smooth hue transition too.
+#[test]
+fn drifts_raise_false_alarms_at_the_stated_rate() {
+    let parts = [Region { x: 0, y: 0, width: 26, height: 20 }, Region { x: 3, y: 5, width: 19, height: 12 }];
+    let made = |seed: u64| {
+        let [planes, plane] =
+            [false, true].map(|is_plane| plane(&bench(seed + 1, [26, 20], is_plane, drifting).frame()));
+        let [hue, pixels] = [Method::SmoothHue, Method::Malvar].map(|method| demosaicked(&plane, method));
+        let xyz = colored(&pixels, Space::Xyz);
+        vec![planes, plane, hue, pixels, xyz]
+    };
+    for (index, corrected) in over_seeds(60, &parts, made).iter().enumerate() {
+        judge(&format!("drifts over flats, {index}"), corrected, 0.0);
+    }
+}
+
+/// Standard deviations beside pixels against the scatter of as many cameras: chi-square of all but one.
+#[test]
+fn sigma_of_drifts_covers() {
+    let places = [[0, 0], [7, 1], [8, 8], [3, 13], [16, 15]];
+    let halves = |layout, count: usize| Taps {
+        layout,
+        gain: vec![1.0, 1.08, 0.93, 1.04][..count].to_vec(),
+        offset_e: vec![3.0, -20.0, 11.0, 0.0][..count].to_vec(),
+        read_noise_e: vec![8.0, 14.0, 25.0, 6.0][..count].to_vec(),
+    };
+    let cases = [
+        (3.0, None),
+        (11.0, None),
+        (60.0, None),
+        (11.0, Some(halves(TapLayout::Columns, 3))),
+        (60.0, Some(halves(TapLayout::Quadrants, 4))),
+    ];
+    for (rows, taps) in cases {
+        let drift = |readout: &mut ReadOut| {
+            (readout.dcnu, readout.prnu, readout.read_noise_e) = (0.05, 0.005, 8.0);
+            (readout.black_drift_e, readout.black_drift_rows) = (60.0, rows);
+            (readout.width, readout.height, readout.taps) = (18, 16, taps.clone());
+        };
+        let electrons = [3000.0, 9000.0, 5000.0];
+        let made = |seed: u64| {
+            let mut readout = support::readout();
+            (readout.bits, readout.full_well_e, readout.adu_per_e, readout.bias_adu) = (14, 60_000.0, 0.25, 700.0);
+            drift(&mut readout);
+            let camera =
+                Camera { readout, size: [18, 16], cfa: Some(CfaPattern::Grbg), seed: 7 * seed, frames: 0.into() };
+            let (exposure_s, temperature_k) = (0.02, camera.readout.temperature_k);
+            let darks = camera.darks(2, exposure_s, temperature_k);
+            let flats = (0..2).map(|_| camera.expose([9000.0, 12_000.0, 7000.0], exposure_s, temperature_k)).collect();
+            let kit = Kit { flat_darks: darks.clone(), darks, flats, ..Kit::default() };
+            demosaicked(&plane(&kit.correct(&camera.expose(electrons, exposure_s, temperature_k))), Method::Bilinear)
+        };
+        let cameras = 600;
+        let all: Vec<MemoryFrame> = (1..=cameras).into_par_iter().map(made).collect();
+        let noise = PixelNoise::of(&all[0].header).unwrap();
+        let mut smallest = 1.0_f64;
+        for [x, y] in places {
+            let of = |c: usize| all.iter().map(move |frame| f64::from(at(frame, x, y, c)));
+            let n = cameras as f64;
+            let means = [0, 1, 2].map(|c| of(c).sum::<f64>() / n);
+            let predicted = symmetric(&noise.covariance([x, y], means).0);
+            for c in 0..3 {
+                let square: f64 = of(c).map(|sample| (sample - means[c]).powi(2)).sum();
+                let p = of_chi_square(square / predicted[(c, c)], n - 1.0);
+                eprintln!("{rows} {x} {y} {c}: {:.3}, p {p:.1e}", square / (n - 1.0) / predicted[(c, c)]);
+                smallest = smallest.min(p);
+            }
+        }
+        assert!(of_smallest(smallest, 3 * places.len()) > 1e-4, "{rows}: {smallest}");
+    }
+}
+
+#[test]
+fn taps_are_predicted() {
+    check(10, [70, 50], tapped([70, 50]));
+}
+
+/// So do frames of several amplifiers, of their parts behind one and behind all.
+#[test]
+fn taps_raise_false_alarms_at_the_stated_rate() {
+    let parts = [
+        Region { x: 0, y: 0, width: 26, height: 20 },
+        Region { x: 3, y: 5, width: 19, height: 12 },
+        Region { x: 1, y: 1, width: 9, height: 7 },
+    ];
+    let change = tapped([26, 20]);
+    let made = |seed: u64| {
+        let [planes, plane] =
+            [false, true].map(|is_plane| plane(&bench(seed + 1, [26, 20], is_plane, &change).frame()));
+        let [hue, pixels] = [Method::SmoothHue, Method::Malvar].map(|method| demosaicked(&plane, method));
+        let xyz = colored(&pixels, Space::Xyz);
+        vec![planes, plane, hue, pixels, xyz]
+    };
+    for (index, corrected) in over_seeds(60, &parts, made).iter().enumerate() {
+        judge(&format!("taps over flats, {index}"), corrected, 0.0);
+    }
+}
+
+/// Amplifiers that do not differ are one: sums in another order, and lines one by one in place of their number.
+#[test]
+fn taps_over_flats_that_are_alike_are_one() {
+    for (seed, layout, count) in
+        [(1, TapLayout::Columns, 3), (2, TapLayout::TopBottom, 2), (4, TapLayout::Quadrants, 4)]
+    {
+        let alike = |chance: &mut Chance, readout: &mut ReadOut| {
+            drifting(chance, readout);
+            let read_noise_e = vec![readout.read_noise_e; count];
+            readout.taps = Some(Taps { layout, gain: vec![1.0; count], offset_e: vec![], read_noise_e });
+            (readout.width, readout.height) = (26, 20);
+        };
+        let whole = plane(&bench(seed, [26, 20], true, alike).frame());
+        for frame in [demosaicked(&whole, Method::Malvar), whole] {
+            let mut one = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+            one.header.metadata.sensor.as_mut().unwrap().readout.as_mut().unwrap().taps = None;
+            for part in [Region { x: 0, y: 0, width: 26, height: 20 }, Region { x: 3, y: 5, width: 19, height: 9 }] {
+                let of = |frame: &MemoryFrame| -> Vec<f64> {
+                    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
+                    let report = measure(&mut source, &[part], Saturated::Kept, Equations::Exact, Some(0.5)).unwrap();
+                    let region = &report.regions[0];
+                    let all = region.channels.iter().chain(&region.classes);
+                    all.flat_map(|channel| [channel.predicted_mean, channel.z_mean, channel.z_std].map(Option::unwrap))
+                        .collect()
+                };
+                for (found, expected) in of(&frame).into_iter().zip(of(&one)) {
+                    let off = (found - expected).abs();
+                    assert!(off < 1e-6 * (1.0 + expected.abs()), "{layout:?} {part:?}: {found} {expected}");
+                }
+            }
+        }
+    }
 }
 
 #[test]

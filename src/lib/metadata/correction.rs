@@ -1,5 +1,6 @@
 //! What corrections took off a frame of codes, as its metadata keep it.
 
+use super::converter::AdcRecord;
 use super::illumination::Illumination;
 use super::records::{NoiseRecord, PoissonKind, is_false, is_no_charge};
 use crate::camera::levels::BlackLevel;
@@ -304,6 +305,15 @@ pub struct FlatRecord {
     /// How many rows of cells these are, and how many columns: (Σ n)²/Σ n² of n cells in each.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cell_lines: Option<[f64; 2]>,
+    /// Column and row on the sensor of the corner of its frames, and their width and height.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area: Option<[i64; 4]>,
+    /// How many of the photosites that each mean is of each amplifier has read, where there are several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tap_photosites: Vec<Vec<u64>>,
+    /// The converters behind these, of a frame that is told as one of them reads it; not stored.
+    #[serde(skip)]
+    pub converters: Vec<AdcRecord>,
     /// Whether the metadata of all its frames say that they were lit evenly.
     pub even: bool,
     /// How they were lit, where that is not so.
@@ -327,6 +337,16 @@ pub struct FlatRecord {
     /// Whether the dark frames among them came off the frame that was divided too.
     #[serde(default, skip_serializing_if = "is_false")]
     pub shares_masters: bool,
+}
+
+impl FlatRecord {
+    /// Which shares of the photosites that the mean of a class is of each of the amplifiers has read whose converters are known; none where
+    /// there is one.
+    pub fn tap_shares(&self, class: usize) -> Option<Vec<f64>> {
+        let of = |counts: &[u64]| counts.get(class).or(counts.first()).copied().unwrap_or_default() as f64;
+        let all = of(&self.photosites).max(1.0);
+        (!self.converters.is_empty()).then(|| self.tap_photosites.iter().map(|counts| of(counts) / all).collect())
+    }
 }
 
 /// How defective photosites were told.

@@ -48,6 +48,13 @@ const WIDE: Limits = Limits { noise: 0.05, left_out: 0.01, lost: 0.01 };
 /// The relative variance of a flat field beyond which no photosite is followed.
 const MOST_NOISE: f64 = 0.1;
 
+/// The covariance of the samples of a photosite with its flat field, and the variance of that, ADU².
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OfLevel {
+    pub with: f64,
+    pub variance: f64,
+}
+
 impl Photosite {
     /// Moments of the class R, G or B after division by the flat field: with A what is left of the codes and F the flat
     /// field at a photosite, ⟨F⟩ the mean of the class,
@@ -64,11 +71,16 @@ impl Photosite {
     /// The same beside what is drawn anew in each frame that is divided by one flat field, less the same dark frames; what it
     /// differs by among photosites has the noise of the flat field in it.
     pub(super) fn divided_over(&self, class: usize, expected_e: f64) -> Option<(Prediction, Temporal)> {
-        self.divided_within(class, expected_e, STRICT)
+        self.divided_within(class, expected_e, STRICT).map(|(prediction, temporal, _)| (prediction, temporal))
+    }
+
+    /// What samples of a photosite and its flat field have in common with the level of that, as far as it is theirs.
+    pub(super) fn of_level(&self, class: usize, expected_e: f64) -> Option<OfLevel> {
+        self.divided_within(class, expected_e, STRICT).map(|(_, _, of_level)| of_level)
     }
 
     /// The same of flat fields within such limits.
-    fn divided_within(&self, class: usize, expected_e: f64, limits: Limits) -> Option<(Prediction, Temporal)> {
+    fn divided_within(&self, class: usize, expected_e: f64, limits: Limits) -> Option<(Prediction, Temporal, OfLevel)> {
         let flat = self.flat?;
         if !self.is_all_open(class, expected_e) || !self.are_tails_open(class, expected_e) {
             return None;
@@ -89,15 +101,14 @@ impl Photosite {
             return None;
         }
         let [first, square, scale, third, above, of_flat] = all.means();
+        let of_level = OfLevel { with: scale * (above - scale * first), variance: of_flat - scale * scale };
         if all.lost > limits.lost * (square - first * first) * all.weight {
             return None;
         }
         let mean = first * scale;
         let variance = ((square - first * first) * scale * scale).max(0.0);
-        // ⟨F⟩ is a mean over as many photosites, the same patterns and the same noise as A/F:
-        // cov(F, A/F) = E A − E F E[A/F], of those that ⟨F⟩ counts.
-        let of_both = 2.0 * scale * first * (above - scale * first);
-        let off = flat.counted_share[class] * of_both + first * first * (of_flat - scale * scale);
+        // ⟨F⟩ is a mean over as many photosites, the same patterns and the same noise as A/F: those that it counts share.
+        let off = flat.counted_share[class] * 2.0 * first * of_level.with + first * first * of_level.variance;
         let prediction = if self.has_tails() {
             parts.iter_mut().for_each(|(weight, _)| *weight /= all.weight);
             mixture(&parts).scaled(scale)
@@ -114,7 +125,17 @@ impl Photosite {
             single: [0.0; 2],
             lines: LineCovariance::default(),
         };
-        Some((Prediction { common: off / flat.photosites[class].max(1.0), ..prediction }, temporal))
+        let prediction = Prediction { common: off / flat.photosites[class].max(1.0), ..prediction };
+        let ratio = flat.ratios[class];
+        if ratio == 1.0 {
+            return Some((prediction, temporal, of_level));
+        }
+        // Behind one of several amplifiers the level is that of all, and what it makes of them together is not told by one.
+        let unlike = temporal.unlike.map(|unlike| unlike.scaled(ratio));
+        let square = ratio * ratio;
+        let temporal =
+            Temporal { variance: square * temporal.variance, rounding: square * temporal.rounding, unlike, ..temporal };
+        Some((prediction.scaled(ratio), temporal, OfLevel { with: ratio * of_level.with, ..of_level }))
     }
 
     /// Sums over the sensitivities of photosites that are alike but for these, of such a share of all, and whether they are so few that
@@ -232,7 +253,7 @@ impl Photosite {
         if let Some(divided) = self.divided(class, expected_e) {
             return divided.moments.variance;
         }
-        if let Some((divided, _)) = self.divided_within(class, expected_e, WIDE) {
+        if let Some((divided, ..)) = self.divided_within(class, expected_e, WIDE) {
             return divided.moments.variance;
         }
         let own = match self.has_tails() {
@@ -245,7 +266,7 @@ impl Photosite {
         let codes = (own - (self.model.response() * level).powi(2)).max(0.0);
         let rho = below.variance / below.mean.powi(2);
         // E[1/F²], and its excess over E[1/F]².
-        codes * (1.0 + 3.0 * rho) + level * level * rho * (1.0 + 8.0 * rho)
+        flat.ratios[class].powi(2) * (codes * (1.0 + 3.0 * rho) + level * level * rho * (1.0 + 8.0 * rho))
     }
 
     /// Whether rounding is a uniform error of an average of such codes: averages, or photosites, scatter.

@@ -174,6 +174,7 @@ mod tests {
             darks: [Some(Dark::mean_of(model, 3)), None, None],
             shares_masters: false,
             level_lines: None,
+            ratios: [1.0; 3],
             levels_adu: [0.0; 2],
         };
         Photosite { flat: Some(flat), ..site }

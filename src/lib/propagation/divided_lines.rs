@@ -11,7 +11,8 @@
 //! K x ⟨φ + F_e γ⟩
 //!
 //! the mean over the lines of whole cells. Of a whole frame the noise of the flat field cancels in the mean, as it does of photosites by
-//! themselves, and what its gains have moves the level, as they would that of a frame without a flat field.
+//! themselves, and what its gains have moves the level, as they would that of a frame without a flat field. Rows that drift are not drawn apart:
+//! what that makes of the level is in [`super::divided_drift`].
 
 use super::charge::sensitivity;
 use super::lines::Axis;
@@ -22,9 +23,9 @@ use crate::frame::Geometry;
 use crate::stages::noise::NoiseModel;
 use nalgebra::{Matrix3, Vector3};
 
-/// Why nothing is said where the level of the flat field drifts.
-const DRIFTING: &str = "it was divided by a flat field, and the black level drifts along rows (`black_drift_e`): how far that moves its level is \
-                        not predicted";
+/// Why nothing is said of a drift where rows do not all count in the level.
+const UNEVEN: &str = "it was divided by a flat field, and the black level drifts along rows (`black_drift_e`): of some rows so many photosites are \
+                      defective, or saturated, that nothing tells how far that moves its level";
 
 /// Why nothing is said where it is not recorded what the level is of.
 const UNRECORDED: &str = "it was divided by a flat field whose rows or columns share noise or gains, and nothing tells of how many its level is the \
@@ -34,11 +35,18 @@ const UNRECORDED: &str = "it was divided by a flat field whose rows or columns s
 const GAINS: &str = "it was divided by a flat field, and rows or columns differ so much in response that the noise of photosites does from one to \
                      the next; how far the variance of a frame scatters by that is not predicted";
 
-/// What a line adds: to the readings of a frame, to those of the flat field, and to the response.
-struct Added {
+/// What a line adds to the readings of a frame, to those of the flat field, and to the response, and what R, G and B have of these.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Added {
     covariance: Matrix3<f64>,
     of_lines: [Vector3<f64>; 3],
-    of_level: [Vector3<f64>; 3],
+}
+
+impl Added {
+    /// What a photosite of one class shares with one of another, each by what it has of these, before the slope.
+    pub fn between(&self, [k, l]: [usize; 2], other: &Self) -> f64 {
+        self.of_lines[k].dot(&(self.covariance * other.of_lines[l]))
+    }
 }
 
 impl Photosite {
@@ -50,13 +58,25 @@ impl Photosite {
     /// [`Unpredictable::Beyond`].
     pub(super) fn check_level(&self, expected_e: [f64; 3], geometry: &Geometry) -> Predicted<()> {
         let Some(flat) = self.flat.filter(|_| self.has_lines()) else { return Ok(()) };
-        if self.drifts() {
-            return Err(Unpredictable::Beyond(DRIFTING));
-        }
         if flat.level_lines.is_none() {
             return Err(Unpredictable::Beyond(UNRECORDED));
         }
+        self.check_level_of_drift()?;
         if self.gains_show(expected_e, geometry) { Err(Unpredictable::Beyond(GAINS)) } else { Ok(()) }
+    }
+
+    /// Makes sure that it is known how far a drift moves the level of a flat field.
+    ///
+    /// # Errors
+    ///
+    /// [`Unpredictable::Beyond`].
+    pub(super) fn check_level_of_drift(&self) -> Predicted<()> {
+        let Some(flat) = self.flat.filter(|_| self.drifts()) else { return Ok(()) };
+        match flat.level_lines.filter(|level| level.rows.is_some()) {
+            None => Err(Unpredictable::Beyond(UNRECORDED)),
+            Some(level) if !level.are_rows_even() => Err(Unpredictable::Beyond(UNEVEN)),
+            Some(_) => Ok(()),
+        }
     }
 
     /// Whether the noise of photosites follows the response of their row, or column, so that the variance of a frame scatters by that: by more
@@ -98,8 +118,8 @@ impl Photosite {
 
     /// What three photosites of R, G and B share by a row, or by a column, in e².
     pub(super) fn shared_by_quotients(&self, axis: Axis, expected_e: [f64; 3]) -> Option<Matrix3<f64>> {
-        let Added { covariance, of_lines, .. } = self.added_by(axis, expected_e)?;
-        Some(Matrix3::from_fn(|k, l| of_lines[k].dot(&(covariance * of_lines[l]))))
+        let added = self.added_by(axis, expected_e)?;
+        Some(Matrix3::from_fn(|k, l| added.between([k, l], &added)))
     }
 
     /// The covariance of what all samples of R, G and B in a frame are off together, as rows and columns move the level of the flat field, less
@@ -108,8 +128,10 @@ impl Photosite {
         let mut sum = [[0.0; 3]; 3];
         let Some(flat) = self.flat.filter(|_| self.has_lines()) else { return sum };
         let Some(level_lines) = flat.level_lines else { return sum };
+        let ratios = self.ratios(expected_e);
         for (index, axis) in Axis::ALL.into_iter().enumerate() {
-            let Some(Added { covariance, of_lines, of_level }) = self.added_by(axis, expected_e) else { continue };
+            let Some((covariance, of_lines)) = self.line_parts(axis, expected_e) else { continue };
+            let of_level = [0, 1, 2].map(|k| Vector3::new(0.0, ratios[k], ratios[k] * flat.expected_e[k]));
             let between = |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(&(covariance * b));
             for (k, row) in sum.iter_mut().enumerate() {
                 for (l, sum) in row.iter_mut().enumerate() {
@@ -123,17 +145,35 @@ impl Photosite {
         sum
     }
 
-    /// What a line adds to quotients of R, G and B, and to their level, before the slope; none of what was not divided.
-    fn added_by(&self, axis: Axis, expected_e: [f64; 3]) -> Option<Added> {
-        let flat = self.flat.as_ref()?;
-        let terms = self.terms(axis);
-        let [.., response] = axis.parts(&self.model.lines);
+    /// The covariance of what a line adds to a frame, to its flat field and to the response of both, the drift of rows apart, and what R, G and
+    /// B have of these before the slope.
+    pub(super) fn line_parts(&self, axis: Axis, expected_e: [f64; 3]) -> Option<(Matrix3<f64>, [Vector3<f64>; 3])> {
+        let Added { mut covariance, of_lines, .. } = self.added_by(axis, expected_e)?;
+        if axis == Axis::Row {
+            let [of_frame, of_both, of_flat] = self.drift_terms(None);
+            covariance -= Matrix3::new(of_frame, of_both, 0.0, of_both, of_flat, 0.0, 0.0, 0.0, 0.0);
+        }
+        Some((covariance, of_lines))
+    }
+
+    /// x of R, G and B: what is left of codes over the flat field; none of what was not divided.
+    pub(super) fn ratios(&self, expected_e: [f64; 3]) -> [f64; 3] {
+        let Some(flat) = &self.flat else { return [0.0; 3] };
         let slope = self.slope();
         let [left_e, left_in_flat_e] = [
             left_e(&self.model, &self.darks, flat.levels_adu[0] / slope),
             left_e(&flat.frames.model, &flat.darks, flat.levels_adu[1] / slope),
         ];
-        let ratio = |k: usize| (expected_e[k] + left_e) / (flat.expected_e[k] + left_in_flat_e);
+        [0, 1, 2].map(|k| (expected_e[k] + left_e) / (flat.expected_e[k] + left_in_flat_e))
+    }
+
+    /// What a line adds to quotients of R, G and B, and to their level, before the slope; none of what was not divided.
+    pub(super) fn added_by(&self, axis: Axis, expected_e: [f64; 3]) -> Option<Added> {
+        let flat = self.flat.as_ref()?;
+        let terms = self.terms(axis);
+        let [.., response] = axis.parts(&self.model.lines);
+        let ratios = self.ratios(expected_e);
+        let ratio = |k: usize| ratios[k];
         Some(Added {
             covariance: Matrix3::new(
                 terms.constant,
@@ -147,7 +187,6 @@ impl Photosite {
                 response * response,
             ),
             of_lines: [0, 1, 2].map(|k| Vector3::new(1.0, -ratio(k), expected_e[k] - ratio(k) * flat.expected_e[k])),
-            of_level: [0, 1, 2].map(|k| Vector3::new(0.0, ratio(k), ratio(k) * flat.expected_e[k])),
         })
     }
 }
@@ -161,10 +200,11 @@ fn left_e(model: &NoiseModel, darks: &[Option<Dark>; MOST_DARKS], level_e: f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metadata::{AdcRecord, PoissonKind};
+    use crate::metadata::{AdcRecord, FrameHeader, Metadata, PoissonKind};
     use crate::propagation::masters::{Flat, LevelLines};
     use crate::propagation::moments::Equations;
     use crate::stages::noise::{LineNoise, Tails};
+    use crate::units::QuantityKind;
 
     const LINES: LineNoise = LineNoise {
         row_noise_e: 7.0,
@@ -202,7 +242,8 @@ mod tests {
             levels: None,
             darks: [Some(bias), None, None],
             shares_masters: false,
-            level_lines: Some(LevelLines { lines: [80.0, 60.0], is_array: false }),
+            level_lines: Some(LevelLines { lines: [80.0, 60.0], is_array: false, rows: Some([0, 80]) }),
+            ratios: [1.0; 3],
             levels_adu: [0.0; 2],
         };
         let site = Photosite::of_electrons(model, Equations::Exact).digitized(AdcRecord::new(14, 600.0, 0.25));
@@ -228,6 +269,21 @@ mod tests {
         }
     }
 
+    /// Of a drift that is one number of a frame nothing of the flat field is left in the mean of the frame, between all classes: K² d² (1 + 1/5).
+    #[test]
+    fn slow_drifts_of_flats_cancel() {
+        let site = divided(LineNoise { black_drift_e: 6.0, black_drift_rows: 1e9, ..LineNoise::default() });
+        let geometry = Geometry::new(60, 80, &["R", "G", "B"]);
+        let frame = FrameHeader { name: "test".into(), geometry, metadata: Metadata::new(QuantityKind::Adu) };
+        let level = site.level_of_drift(LIGHT, &frame);
+        let loads = site.drift_loads(site.ratios(LIGHT), [0.25; 3], None);
+        let expected = 0.25 * 0.25 * 1.2 * 36.0;
+        for (k, l) in (0..9).map(|pair| (pair / 3, pair % 3)) {
+            let found = loads[k][0] * loads[l][0] + loads[k][1] * loads[l][1] + level[k][l];
+            assert!((found / expected - 1.0).abs() < 1e-6, "{k} {l}: {found} {expected}");
+        }
+    }
+
     /// Gains come off each photosite, and move the level as they would that of a frame that was not divided: by s of it in each line.
     #[test]
     fn gains_move_the_level() {
@@ -245,7 +301,7 @@ mod tests {
     /// Red and blue photosites share no row and no column; green ones are in every one.
     #[test]
     fn classes_of_an_array_share_lines() {
-        let lines = LevelLines { lines: [40.0, 30.0], is_array: true };
+        let lines = LevelLines { lines: [40.0, 30.0], is_array: true, rows: None };
         // Of 40 rows of cells red has 40 rows, green 80.
         assert_eq!([[0, 0], [1, 1], [0, 1], [0, 2]].map(|pair| lines.shared(0, pair) * 80.0), [2.0, 1.0, 1.0, 0.0]);
     }

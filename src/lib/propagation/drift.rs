@@ -14,6 +14,9 @@
 use crate::stages::noise::knots;
 use std::f64::consts::{FRAC_PI_2, PI};
 
+/// Independent numbers of a knot at most: that of a frame, and that of the flat field by which it was divided.
+pub const NUMBERS: usize = 2;
+
 /// Rows of the sensor of which photosites are taken: the first, from one to the next, how many, and photosites of each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriftRows {
@@ -128,6 +131,48 @@ impl Drift {
             .map(|(rows, weight)| DriftRows { columns: rows.columns * weight, ..*rows })
             .collect();
         Self::of(&weighted, rows_per_knot).square()
+    }
+}
+
+/// What the mean of some rows has of each knot of a drift.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct KnotMeans {
+    first: i64,
+    means: Vec<f64>,
+}
+
+impl KnotMeans {
+    /// Of rows of the sensor, the first of them, from one to the next and how many; of none nothing.
+    pub fn of(rows: &DriftRows, rows_per_knot: f64) -> Self {
+        let Drift { count, first_knot, sums, .. } = Drift::of(&[DriftRows { columns: 1.0, ..*rows }], rows_per_knot);
+        match count > 0.0 {
+            true => Self { first: first_knot, means: sums.iter().map(|sum| sum / count).collect() },
+            false => Self { first: 0, means: Vec::new() },
+        }
+    }
+
+    /// Of rows of the sensor, from the first on, of which the mean has such shares.
+    pub fn of_shares(first: i64, shares: &[f64], rows_per_knot: f64) -> Self {
+        let base = knots(first, rows_per_knot).0;
+        let mut means = Vec::new();
+        for (index, share) in shares.iter().enumerate() {
+            let (knot, parts) = knots(first + index as i64, rows_per_knot);
+            let place = usize::try_from(knot - base).unwrap_or_default();
+            means.resize((place + 2).max(means.len()), 0.0);
+            (0..2).for_each(|part| means[place + part] += share * parts[part]);
+        }
+        Self { first: base, means }
+    }
+
+    /// Of a knot.
+    pub fn at(&self, knot: i64) -> f64 {
+        let place = usize::try_from(knot - self.first).ok();
+        place.and_then(|place| self.means.get(place)).copied().unwrap_or_default()
+    }
+
+    /// The covariance of two of these, of a drift of variance 1.
+    pub fn between(&self, other: &Self) -> f64 {
+        (self.first..).zip(&self.means).map(|(knot, mean)| mean * other.at(knot)).sum()
     }
 }
 

@@ -1,18 +1,23 @@
 //! What the pixels of a rectangle have together of each knot of a drift of the black level.
 //!
-//! Pixel a has V_i(a; m) of the knot m. With g = Σ_a V(a), and T_ij(m, m′) = Σ_a V_i(a; m) V_j(a; m′), which has a few diagonals, two pixels
-//! have the covariance D_ij(a, b) = Σ_m V_i(a; m) V_j(b; m), and
+//! Pixel a has V_i(a; m) of the number m: a knot has one, or where a flat field divided them as many as [`NUMBERS`], one after another. With
+//! g = Σ_a V(a), and T_ij(m, m′) = Σ_a V_i(a; m) V_j(a; m′), which has a few diagonals, two pixels have the covariance
+//! D_ij(a, b) = Σ_m V_i(a; m) V_j(b; m), and
 //!
 //! - Σ_a D(a, a) = Σ_m T(m, m),  Σ_ab D = g gᵀ
 //! - Σ_ab D_ik D_jl = Σ_mm′ T_ij(m, m′) T_kl(m, m′)
 
 use super::covariance::PAIRS;
+use super::drift::NUMBERS;
 use super::line_sampling::Powers;
 use crate::stages::demosaic::stencil::REACH;
 use nalgebra::{Matrix3, Vector3};
 
 /// Knots that the rows of a stencil meet: there are two rows at least from one to the next.
-pub(super) const KNOTS: usize = REACH.unsigned_abs() + 3;
+const KNOTS: usize = REACH.unsigned_abs() + 3;
+
+/// The numbers of these.
+pub(super) const WIDTH: usize = NUMBERS * KNOTS;
 
 /// g and T.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,13 +25,13 @@ pub(super) struct Bands {
     /// g.
     pub sums: Vec<Vector3<f64>>,
     /// T(m, m + δ).
-    pub products: Vec<[Matrix3<f64>; KNOTS]>,
+    pub products: Vec<[Matrix3<f64>; WIDTH]>,
 }
 
 impl Bands {
-    /// Of so many knots, nothing yet.
-    pub fn zero(knots: usize) -> Self {
-        Self { sums: vec![Vector3::zeros(); knots], products: vec![[Matrix3::zeros(); KNOTS]; knots] }
+    /// Of so many numbers, nothing yet.
+    pub fn zero(numbers: usize) -> Self {
+        Self { sums: vec![Vector3::zeros(); numbers], products: vec![[Matrix3::zeros(); WIDTH]; numbers] }
     }
 
     /// Σ_a D(a, a).
@@ -43,7 +48,11 @@ impl Bands {
     pub fn each(&self) -> impl Iterator<Item = (usize, usize, Matrix3<f64>)> + '_ {
         self.products.iter().enumerate().flat_map(|(m, of_knot)| {
             of_knot.iter().enumerate().flat_map(move |(apart, band)| {
-                let both = if apart == 0 { 1 } else { 2 };
+                let both = match (*band == Matrix3::zeros(), apart) {
+                    (true, _) => 0,
+                    (false, 0) => 1,
+                    (false, _) => 2,
+                };
                 [(m, m + apart, *band), (m + apart, m, band.transpose())].into_iter().take(both)
             })
         })
@@ -80,7 +89,7 @@ impl Bands {
             let (low, high) = (m.min(n), m.max(n));
             self.products[low].get(high - low).map_or(0.0, |band| band[(channel, channel)])
         };
-        let near = |m: usize| m.saturating_sub(KNOTS - 1)..(m + KNOTS).min(length);
+        let near = |m: usize| m.saturating_sub(WIDTH - 1)..(m + WIDTH).min(length);
         let [mut one, mut two, mut three, mut square, mut cube] = [0.0; 5];
         for m in 0..length {
             one += entry(m, m);

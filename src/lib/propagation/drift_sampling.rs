@@ -8,11 +8,13 @@
 //! - Σ_ab D = g gᵀ, and the row sums are V(a) gᵀ
 //! - Σ_ab D_ik D_jl = Σ_mm′ T_ij(m, m′) T_kl(m, m′)
 //!
+//! Where a flat field divided them a knot has two numbers, each with a κ of its own, which count as two.
+//!
 //! Pixels of one row and parity have one V. So the products with what is each photosite's own, or shared by row or column, are sums over rows
 //! of what these have together in all columns, which far from the edges is the same in every other row.
 
 use super::covariance::PAIRS;
-use super::drift_bands::{Bands, KNOTS};
+use super::drift_bands::{Bands, WIDTH};
 use super::line_sampling::{AxisSums, Nonlocal, Shared, add_both, sum_of};
 use super::mixed_pixel::pixels_of;
 use super::moments::SiteCovariance;
@@ -44,18 +46,18 @@ pub(super) struct DriftSums {
     pub powers: [[f64; 3]; 3],
 }
 
-/// What a pixel has of each knot, from the first on.
+/// What a pixel has of each number of the knots, from the first on.
 #[derive(Clone, Copy)]
 struct Loads {
     first: usize,
-    of_knots: [Vector3<f64>; KNOTS],
+    of_numbers: [Vector3<f64>; WIDTH],
 }
 
 impl Loads {
     fn covariance(&self, other: &Self) -> Matrix3<f64> {
-        let mine = self.of_knots.iter().enumerate();
+        let mine = self.of_numbers.iter().enumerate();
         mine.filter_map(|(k, mine)| {
-            let theirs = other.of_knots.get((self.first + k).checked_sub(other.first)?)?;
+            let theirs = other.of_numbers.get((self.first + k).checked_sub(other.first)?)?;
             Some(mine * theirs.transpose())
         })
         .sum()
@@ -63,7 +65,7 @@ impl Loads {
 
     /// Σ_m V(m) xᵀ(m).
     fn with(&self, all: &[Vector3<f64>]) -> Matrix3<f64> {
-        self.of_knots.iter().zip(&all[self.first..]).map(|(mine, sum)| mine * sum.transpose()).sum()
+        self.of_numbers.iter().zip(&all[self.first..]).map(|(mine, sum)| mine * sum.transpose()).sum()
     }
 }
 
@@ -87,25 +89,27 @@ impl Lines {
                 let row = first_row + t as i64;
                 let first = of_row(row - reach).0;
                 [0, 1].map(|p| {
-                    let mut of_knots = [Vector3::zeros(); KNOTS];
+                    let mut of_numbers = [Vector3::zeros(); WIDTH];
                     for (line, weights) in rows.profile(t, p).iter().enumerate() {
                         let load = drift.load(weights);
                         let (knot, [a, b]) = of_row(row - reach + line as i64);
                         let k = usize::try_from(knot - first).unwrap_or_default();
-                        of_knots[k] += a * load;
-                        of_knots[k + 1] += b * load;
+                        for (part, load) in load.column_iter().take(drift.rank).enumerate() {
+                            of_numbers[k * drift.rank + part] += a * load;
+                            of_numbers[(k + 1) * drift.rank + part] += b * load;
+                        }
                     }
-                    Loads { first: place_of(first), of_knots }
+                    Loads { first: place_of(first) * drift.rank, of_numbers }
                 })
             })
             .collect();
         let counts = rows.counts();
-        let length = loads.last().map_or(0, |[last, _]| last.first) + KNOTS;
+        let length = loads.last().map_or(0, |[last, _]| last.first) + WIDTH;
         let mut bands = Bands::zero(length);
         for (loads, count) in loads.iter().flat_map(|both| both.iter().zip(counts)) {
-            for (k, load) in loads.of_knots.iter().enumerate() {
+            for (k, load) in loads.of_numbers.iter().enumerate() {
                 bands.sums[loads.first + k] += count * load;
-                for (apart, other) in loads.of_knots[k..].iter().enumerate() {
+                for (apart, other) in loads.of_numbers[k..].iter().enumerate() {
                     bands.products[loads.first + k][apart] += count * load * other.transpose();
                 }
             }
@@ -218,7 +222,7 @@ impl Products {
         for (t, both) in lines.loads.iter().enumerate() {
             for (p, loads) in both.iter().enumerate() {
                 let sums = sums[p][t % 2][loads.first..].iter_mut();
-                sums.zip(&loads.of_knots).for_each(|(sum, load)| *sum += load);
+                sums.zip(&loads.of_numbers).for_each(|(sum, load)| *sum += load);
                 self.add_row_sums(&lines.row_sum(t, p), &columns.row_sums[t % 2][p]);
             }
         }

@@ -5,6 +5,7 @@ use super::lines::Axis;
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::repeated::{is_linear, without_fixed};
+use super::tapped_flat;
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::frame::Geometry;
 use crate::metadata::{AdcRecord, AverageRecord, FrameHeader};
@@ -44,6 +45,9 @@ impl Repeated {
     pub fn of(frame: &FrameHeader, equations: Equations, frames: u32) -> Predicted<Self> {
         if frame.metadata.average.is_some() {
             return Err(Unpredictable::Beyond(AVERAGES));
+        }
+        if frame.taps().is_some() && tapped_flat::flat_of(frame).is_some() {
+            return Err(Unpredictable::Beyond(tapped_flat::FLATTENED));
         }
         let sites = Sites::of(frame, equations)?;
         if !is_linear(frame) {

@@ -15,6 +15,7 @@ use super::spaces::{Channels, Curved, OTHER_COLORS, is_curved, white};
 use super::tails;
 use super::tap_lines::{Lit, TapLines};
 use super::tapped::{TapMoments, TappedPixels};
+use super::tapped_flat;
 use super::taps::{self, Group, TappedSites};
 use super::unpredictable::{OFFSETS_TOO_LONG, TOO_LONG};
 pub use super::unpredictable::{Predicted, Unpredictable};
@@ -107,8 +108,9 @@ pub fn of_frame(frame: &FrameHeader, equations: Equations) -> Predicted<FramePre
     Ok(prediction)
 }
 
-/// The same for how samples scatter: where photosites follow what their rows and columns share on a curve, by their places, as those of
-/// several amplifiers are told, which [`of_frame`] does not tell apart. So are pixels.
+/// The same for how samples scatter: where photosites follow what their rows and columns share on a curve, or where these drift over a flat
+/// field, whose level hangs on its rows, by their places, as those of several amplifiers are told, which [`of_frame`] does not tell apart. So
+/// are pixels.
 ///
 /// # Errors
 ///
@@ -119,12 +121,17 @@ pub fn of_samples(frame: &FrameHeader, equations: Equations) -> Predicted<FrameP
         return Ok(found);
     }
     let sites = Sites::of(frame, equations)?;
+    let drifts = sites.photosite.drifts() && sites.photosite.flat.is_some();
+    if drifts {
+        return by_place(frame, equations, &sites, found);
+    }
     if !sites.photosite.bends_lines(sites.expected_e)? {
         return Ok(found);
     }
     let by_places = match &found {
         FramePrediction::Planes(moments) => {
-            taps::one_group(frame, &sites.lit(), *moments, sites.average(frame)?.as_ref())?.map(FramePrediction::Groups)
+            taps::one_group(frame, &sites.lit(), *moments, sites.average(frame)?.as_ref(), false)?
+                .map(FramePrediction::Groups)
         }
         FramePrediction::Pixels(moments) => {
             let method = frame.metadata.demosaic.as_ref().and_then(|record| Method::named(&record.method));
@@ -136,6 +143,29 @@ pub fn of_samples(frame: &FrameHeader, equations: Equations) -> Predicted<FrameP
         FramePrediction::Groups(_) | FramePrediction::Tapped(_) => None,
     };
     Ok(by_places.unwrap_or(found))
+}
+
+/// What is `found` of a frame, by its places.
+fn by_place(
+    frame: &FrameHeader,
+    equations: Equations,
+    sites: &Sites,
+    found: FramePrediction,
+) -> Predicted<FramePrediction> {
+    Ok(match found {
+        FramePrediction::Planes(moments) => {
+            let average = sites.average(frame)?;
+            let group = taps::one_group(frame, &sites.lit(), moments, average.as_ref(), true)?;
+            group.map_or(FramePrediction::Planes(moments), FramePrediction::Groups)
+        }
+        FramePrediction::Pixels(moments) => {
+            let method = frame.metadata.demosaic.as_ref().and_then(|record| Method::named(&record.method));
+            let pixels = pixels_by_place(frame, equations)?;
+            let pixels = if method == Some(Method::SmoothHue) { pixels.with_moments(&moments) } else { pixels };
+            FramePrediction::Tapped(Box::new(pixels))
+        }
+        by_taps => by_taps,
+    })
 }
 
 impl FramePrediction {
@@ -189,8 +219,14 @@ impl Sites {
                 return Err(Unpredictable::Beyond("charge transfer before rows and columns that share noise"));
             }
             moments.iter_mut().zip(lines).for_each(|(moments, lines)| moments.lines = lines);
-            let levels = photosite.level_covariance(expected_e);
-            moments.iter_mut().zip(levels).for_each(|(moments, level)| moments.lines.level = level);
+            // What several amplifiers make of a level is told of all together.
+            let is_of_one = frame.metadata.correction.as_ref().and_then(|correction| correction.flat.as_ref());
+            let is_of_one = is_of_one.is_none_or(|flat| flat.converters.is_empty());
+            let levels = [photosite.level_covariance(expected_e), photosite.level_of_drift(expected_e, frame)];
+            for (k, moments) in moments.iter_mut().enumerate() {
+                moments.lines.level =
+                    [0, 1, 2].map(|l| if is_of_one { levels[0][k][l] + levels[1][k][l] } else { 0.0 });
+            }
             if frame.geometry.channels.len() == 3 && frame.metadata.demosaic.is_none() {
                 let beyond = photosite.beyond_lines(expected_e, &lines)?;
                 moments.iter_mut().zip(beyond).for_each(|(moments, together)| moments.lines.together = together);
@@ -380,9 +416,6 @@ fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> 
     if equations == Equations::Paper {
         return beyond(OF_ONE);
     }
-    if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
-        return beyond(taps::FLATTENED);
-    }
     pixels_by_place(frame, equations)
 }
 
@@ -407,5 +440,13 @@ fn pixels_by_place(frame: &FrameHeader, equations: Equations) -> Predicted<Tappe
     let is_shared = moments.iter().flatten().any(|site| site.lines != LineCovariance::default());
     let lines = if is_shared { TapLines::of(&lit, &moments, average.as_ref())? } else { None };
     let black = subtracted(record.black, record.black_deltas)?;
-    TappedPixels::of(frame, &Channels::of(metadata, quantity_of_sites(frame))?, black, &groups, lines.as_ref())
+    let channels = Channels::of(metadata, quantity_of_sites(frame))?;
+    let level = match tapped_flat::flat_of(frame).filter(|_| frame.taps().is_some()) {
+        Some(flat) => taps::level_of_flat(frame, flat, |frame| {
+            let sites = Sites::of(frame, equations)?;
+            Ok((sites.lit(), sites.moments))
+        })?,
+        None => taps::level(&groups.iter().map(|(_, group)| *group).collect::<Vec<_>>()),
+    };
+    Ok(TappedPixels::of(frame, &channels, black, &groups, lines.as_ref())?.with_level(&level))
 }

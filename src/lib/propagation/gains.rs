@@ -9,7 +9,7 @@
 
 use super::covariance::PAIRS;
 use super::moments::SiteCovariance;
-use super::row_drift::{LineWeights, RowDrift};
+use super::row_drift::{LineWeights, Load, RowDrift};
 use crate::cfa::Class;
 use crate::stages::demosaic::stencil::{PHASES, REACH, phase};
 use crate::stages::demosaic::weights::Weights;
@@ -98,7 +98,7 @@ pub fn mean_pixel_covariance(weights: &Weights, sites: &SiteCovariance) -> Matri
 pub fn lagged_covariance(weights: &Weights, phase: usize, lag: [isize; 2], sites: &SiteCovariance) -> Matrix3<f64> {
     let covariance = autocovariance(weights, phase, lag).of(sites);
     let Some(drift) = RowDrift::of(sites) else { return covariance };
-    let loads = |phase: usize, first: isize| -> Vec<(isize, Vector3<f64>)> {
+    let loads = |phase: usize, first: isize| -> Vec<(isize, Load)> {
         let load = |row: isize| (first + row, drift.load(&line_weights(weights, phase, 0, row)));
         (-REACH..=REACH).map(load).collect()
     };

@@ -82,7 +82,7 @@ impl Variances {
     }
 
     fn at(&self, place: usize) -> f64 {
-        let expected_e = self.photosite.expected_at(place as f64 * self.step);
+        let expected_e = self.photosite.expected_of(self.class, place as f64 * self.step);
         let one = self.of_one(expected_e);
         let averaged = |record| self.photosite.variance_of_average(self.class, expected_e, one, record);
         self.average.as_ref().map_or(one, averaged)
@@ -114,7 +114,7 @@ impl Variances {
     /// Whether an average hangs on where in a code it lies.
     fn is_by_code(&self, place: usize) -> bool {
         let Some(record) = &self.average else { return false };
-        let expected_e = self.photosite.expected_at(place as f64 * self.step);
+        let expected_e = self.photosite.expected_of(self.class, place as f64 * self.step);
         self.photosite.is_average_by_code(expected_e, record) && !self.photosite.is_spread_over_codes(expected_e)
     }
 }

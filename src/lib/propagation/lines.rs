@@ -67,10 +67,6 @@ pub(super) const DRIFT_CUT: &str = "its black level drifts along rows, and full 
 const DRIFT_BENT: &str =
     "its black level drifts along rows, and the curve of the converter (`linearization`) bends what rows share by that";
 
-/// Why pixels of frames that were divided by a flat field have no standard deviations where the black level drifts.
-pub(super) const DIVIDED_DRIFT: &str =
-    "its black level drifts along rows (`black_drift_e`), and it was divided by a flat field";
-
 /// Why the paper says nothing.
 const NOT_IN_THE_PAPER: &str = "the paper has no equations for noise of rows and columns, nor for fixed offsets";
 
@@ -192,7 +188,13 @@ impl Photosite {
             return Ok(self.by_class(&row?, &column?, [self.slope(); 3]));
         };
         let [row, column] = Axis::ALL.map(|axis| self.straight(axis, expected_e, slopes));
-        Ok(self.by_class(&row, &column, slopes[0]))
+        let mut found = self.by_class(&row, &column, slopes[0]);
+        if self.flat.is_some() && self.drifts() {
+            let loads = self.drift_loads(self.ratios(expected_e), slopes[0], None);
+            let of_class = |k: usize| loads.map(|other| loads[k].iter().zip(other).map(|(a, b)| a * b).sum());
+            found.iter_mut().enumerate().for_each(|(k, lines)| lines.drift = of_class(k));
+        }
+        Ok(found)
     }
 
     /// Slopes of the samples of each class to what is added to their lines, and to what these have more of the light; none where they follow
@@ -203,14 +205,14 @@ impl Photosite {
     /// As [`Self::lines`].
     pub(super) fn line_slopes(&self, expected_e: [f64; 3]) -> Predicted<Option<[[f64; 3]; 2]>> {
         let regime = self.regime(expected_e)?;
-        if self.has_tails() && regime != Regime::Curved {
-            return self.slopes_of_unlike(expected_e).map(Some);
-        }
-        Ok(match regime {
+        let found = match regime {
+            Regime::Curved => None,
+            _ if self.has_tails() => Some(self.slopes_of_unlike(expected_e)?),
             Regime::Straight => Some([[self.slope(); 3]; 2]),
             Regime::OnAverage => Some([expected_e.map(|expected_e| self.mean_slope(expected_e)); 2]),
-            Regime::Curved => None,
-        })
+        };
+        let scales = self.flat.map_or([1.0; 3], |flat| flat.ratios);
+        Ok(found.map(|slopes| slopes.map(|slopes| [0, 1, 2].map(|k| scales[k] * slopes[k]))))
     }
 
     /// The same photosites over exposures: their means, in which all that rows and columns have anew is noise like that of their own.

@@ -203,6 +203,8 @@ pub struct Flat {
     pub shares_masters: bool,
     /// How many lines of cells its level is of; none where that is not recorded.
     pub level_lines: Option<LevelLines>,
+    /// The level of each class over the mean of F: behind one of several amplifiers not 1.
+    pub ratios: [f64; 3],
     /// What came off as a level, beyond the bias of the converter, ADU: of the frame that is divided, and of the flat field.
     pub levels_adu: [f64; 2],
 }
@@ -214,9 +216,34 @@ pub struct LevelLines {
     pub lines: [f64; 2],
     /// Whether cells are those of a filter array, so that red and blue photosites share none; planes share all.
     pub is_array: bool,
+    /// The first of the rows of the sensor that they are of, and how many; none where that is not recorded.
+    pub rows: Option<[i64; 2]>,
 }
 
 impl LevelLines {
+    /// What is recorded; none where nothing is.
+    fn of(record: &FlatRecord, is_array: bool) -> Option<Self> {
+        let cell = if is_array { 2 } else { 1 };
+        let rows = record.area.map(|[_, first, _, height]| [first, height - height.rem_euclid(cell)]);
+        record.cell_lines.map(|lines| Self { lines, is_array, rows })
+    }
+
+    /// Whether all of its rows count as much: 1 + (their rms difference)² is as many as there are over as many as they count for.
+    pub(super) fn are_rows_even(&self) -> bool {
+        /// The level of rows that differ by 5 % has a drift that is less off.
+        const UNEVEN: f64 = 1.0025;
+        let cells = |[_, rows]: [i64; 2]| if self.is_array { rows as f64 / 2.0 } else { rows as f64 };
+        self.rows.is_some_and(|rows| cells(rows) <= UNEVEN * self.lines[0])
+    }
+
+    /// Rows, and columns, of cells of an area over as many as count as if all had as many whole ones.
+    pub(super) fn unevenness(&self, area: Option<[i64; 4]>) -> [f64; 2] {
+        let cell = if self.is_array { 2 } else { 1 };
+        let [_, _, width, height] = area.unwrap_or_default();
+        let of = |length: i64, lines: f64| if lines > 0.0 { ((length / cell) as f64 / lines).max(1.0) } else { 1.0 };
+        [of(height, self.lines[0]), of(width, self.lines[1])]
+    }
+
     /// What the means of two classes R, G and B have in common of what each row has by itself (0), or each column (1): Σ w w′ over lines.
     pub(super) fn shared(&self, axis: usize, [k, l]: [usize; 2]) -> f64 {
         let one = self.lines[axis].recip();
@@ -301,22 +328,34 @@ impl Flat {
         let is_green = |channel: &String| channel == "G";
         let are_planes = record.means_adu.len() == 1
             || frame.metadata.demosaic.is_none() && frame.geometry.channels.iter().any(is_green);
-        let level_adu = record.black_adu.map_or(0.0, |black| black - adc.bias_adu);
+        let level_adu = |adc: &AdcRecord| record.black_adu.map_or(0.0, |black| black - adc.bias_adu);
         // What dark signal is left in the means is no light.
         let dark_e = |model: &NoiseModel| model.dark_e * sensitivity(model.dcnu).0 + model.tails.mean_hot_e();
         let off_e: f64 = darks.iter().flatten().map(|dark| dark.weight * dark_e(&dark.model)).sum();
-        let left_e = dark_e(&model) - off_e - level_adu / adc.adu_per_e;
-        let light_e = |mean: f64| (mean / adc.adu_per_e - left_e) / sensitivity(model.response()).0;
+        let left_e = |adc: &AdcRecord| dark_e(&model) - off_e - level_adu(adc) / adc.adu_per_e;
+        let (means, response) = (three(&record.means_adu)?, sensitivity(model.response()).0);
+        let light_e = |k: usize| match record.tap_shares(k) {
+            // The mean is that of what all have made of the light.
+            Some(shares) => {
+                let all = || shares.iter().zip(&record.converters);
+                let left: f64 = all().map(|(share, adc)| share * adc.adu_per_e * left_e(adc)).sum();
+                (means[k] - left) / (response * all().map(|(share, adc)| share * adc.adu_per_e).sum::<f64>())
+            }
+            None => (means[k] / adc.adu_per_e - left_e(adc)) / response,
+        };
+        let expected_e = [0, 1, 2].map(light_e);
+        let ratio = |k: usize| means[k] / (adc.adu_per_e * (expected_e[k] * response + left_e(adc)));
         Some(Self {
-            expected_e: three(&record.means_adu)?.map(light_e),
+            expected_e,
+            ratios: if record.converters.is_empty() { [1.0; 3] } else { [0, 1, 2].map(ratio) },
             photosites: three(&photosites)?,
             counted_share: three(&counted)?,
             frames: Dark { weight: 1.0, is_bias: false, model, frames, combine, clip: clip.unwrap_or(CLIP) },
             levels: (record.levels.len() > 1).then(|| leveled(combine, clip.unwrap_or(CLIP), &record.levels)),
             darks,
             shares_masters: record.shares_masters,
-            level_lines: record.cell_lines.map(|lines| LevelLines { lines, is_array: !are_planes }),
-            levels_adu: [0.0, level_adu],
+            level_lines: LevelLines::of(record, !are_planes),
+            levels_adu: [0.0, level_adu(adc)],
         })
     }
 

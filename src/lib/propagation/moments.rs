@@ -139,6 +139,22 @@ impl LineCovariance {
     }
 }
 
+impl LineCovariance {
+    /// The same of samples of which the products with R, G and B are so many times as large.
+    #[must_use]
+    pub(super) fn scaled(&self, by: [f64; 3]) -> Self {
+        let scaled = |covariances: [f64; 3]| [0, 1, 2].map(|l| by[l] * covariances[l]);
+        Self {
+            row: scaled(self.row),
+            column: scaled(self.column),
+            drift: scaled(self.drift),
+            drift_rows: self.drift_rows,
+            together: scaled(self.together),
+            level: scaled(self.level),
+        }
+    }
+}
+
 /// Covariance of what all samples of R, G and B in a frame are off together.
 pub fn common(sites: &[Prediction; 3]) -> Matrix3<f64> {
     Matrix3::from_diagonal(&sites.map(|site| site.common).into()) + Matrix3::from_fn(|k, l| sites[k].lines.level[l])

@@ -130,9 +130,20 @@ impl Photosite {
         }
     }
 
+    /// The same of a class, as the level of the flat field that divided its samples has it.
+    pub(super) fn expected_of(&self, class: usize, level: f64) -> f64 {
+        self.expected_at(level / self.flat.map_or(1.0, |flat| flat.ratios[class]))
+    }
+
     /// Units of its samples to an electron; of codes that are not straight, where there are few.
     pub fn slope(&self) -> f64 {
         self.adc.map_or(1.0, |adc| adc.adu_per_e)
+    }
+
+    /// The level above black at full well.
+    pub(super) fn largest(&self) -> f64 {
+        let scale = self.flat.map_or(1.0, |flat| flat.ratios.into_iter().fold(1.0, f64::max));
+        scale * self.model.full_well_e * self.slope()
     }
 
     /// Mean and variance of its samples over the photosites of a frame, before any division by a flat field.

@@ -3,7 +3,7 @@
 use super::covariance::{Covariance, PAIRS};
 use super::lines::LineTerms;
 use super::photosite::Photosite;
-use super::pixel_drift::PixelDrift;
+use super::pixel_drift::{DriftLoads, PixelDrift};
 use super::pixel_gains::{PixelGains, phase_at};
 use crate::frame::Geometry;
 use crate::metadata::AverageRecord;
@@ -17,6 +17,7 @@ pub(super) struct PixelLines {
     terms: [LineTerms; 2],
     drift: Option<PixelDrift>,
     photosite: Photosite,
+    average: Option<AverageRecord>,
 }
 
 /// What photosites share at some level.
@@ -24,8 +25,8 @@ pub(super) struct PixelLines {
 pub(super) struct AtLevel {
     /// The covariances of pairs of classes in a row, then in a column, less the drift of these.
     shared: [f64; 2 * PAIRS.len()],
-    /// The slopes of the samples of each class to the charge.
-    slopes: [f64; 3],
+    /// What samples of each class have of the drift.
+    drift: DriftLoads,
 }
 
 impl PixelLines {
@@ -39,36 +40,45 @@ impl PixelLines {
         geometry: &Geometry,
         gain: impl Fn([isize; 2]) -> f64,
     ) -> Self {
-        let drift = photosite.drifts().then(|| PixelDrift::of(&photosite, average, table, kinds, geometry, &gain));
+        let pattern = Some(table.pattern());
+        let drift =
+            photosite.drifts().then(|| PixelDrift::of(&photosite, average, pattern, table, kinds, geometry, &gain));
         let [rows, columns] = photosite.line_terms(average);
         Self {
             gains: kinds.iter().map(|&at| PixelGains::of_lines(table, at, geometry, &gain)).collect(),
             terms: [drift.as_ref().map_or(rows, |drift| drift.off(rows)), columns],
             drift,
             photosite,
+            average: average.copied(),
         }
     }
 
-    /// What photosites share at levels above black.
-    pub fn at(&self, level: [f64; 3]) -> AtLevel {
+    /// What photosites share at levels of codes above black, where such a share of light fell on the flat field.
+    pub fn at(&self, level: [f64; 3], share: f64) -> AtLevel {
         let full_well_e = self.photosite.model.full_well_e;
         // `max` drops what is no number.
-        let expected_e = level.map(|level| self.photosite.expected_at(level.max(0.0)).max(0.0).min(full_well_e));
-        let x = self.photosite.line_signals(expected_e);
+        let expected_e = [0, 1, 2].map(|k| self.photosite.expected_of(k, level[k].max(0.0)).max(0.0).min(full_well_e));
+        let is_divided = self.photosite.flat.is_some();
+        let x = self.photosite.line_signals(expected_e).map(|signal| if is_divided { signal / share } else { signal });
         let dark_e = self.photosite.model.dark_e;
-        let slopes = expected_e.map(|e| self.photosite.adc.map_or(1.0, |adc| adc.sample_per_e(e + dark_e)));
+        let of_codes = |e: f64| self.photosite.adc.map_or(1.0, |adc| adc.sample_per_e(e + dark_e));
+        let scales = self.photosite.flat.map_or([1.0; 3], |flat| flat.ratios);
+        let slopes: [f64; 3] = std::array::from_fn(|k| scales[k] * of_codes(expected_e[k]));
         let shared = std::array::from_fn(|index| {
             let [k, l] = PAIRS[index % PAIRS.len()];
             slopes[k] * slopes[l] * self.terms[index / PAIRS.len()].at(x[k], x[l])
         });
-        AtLevel { shared, slopes }
+        let ratios = self.photosite.ratios(expected_e);
+        let of_rows = self.photosite.drift_loads(ratios.map(|ratio| ratio / share), slopes, self.average.as_ref());
+        let drift = DriftLoads { of_rows, of_level: self.photosite.level_loads(ratios, slopes) };
+        AtLevel { shared, drift }
     }
 
     /// What photosites of such levels share with others, of their variance, where their slope is that of all.
-    pub fn of_sites(&self, AtLevel { shared, slopes }: &AtLevel) -> [f64; 3] {
+    pub fn of_sites(&self, AtLevel { shared, drift: loads }: &AtLevel) -> [f64; 3] {
         std::array::from_fn(|class| {
             let own = PAIRS.iter().position(|pair| *pair == [class, class]).unwrap_or_default();
-            let drift = self.drift.as_ref().map_or(0.0, |drift| drift.of_site(slopes[class]));
+            let drift = self.drift.as_ref().map_or(0.0, |_| loads.of_site(class));
             shared[own] + shared[PAIRS.len() + own] + drift
         })
     }
@@ -78,7 +88,7 @@ impl PixelLines {
         let of_lines = self.gains[kind].covariance(level.shared, hues);
         match &self.drift {
             Some(drift) => {
-                let of_drift = drift.covariance(kind, row, level.slopes, hues);
+                let of_drift = drift.covariance(kind, row, &level.drift, hues);
                 std::array::from_fn(|pair| of_lines[pair] + of_drift[pair])
             }
             None => of_lines,

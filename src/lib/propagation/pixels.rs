@@ -8,7 +8,6 @@ use super::charge;
 use super::covariance::Covariance;
 use super::ground::{corrected, quantity_of_sites};
 use super::level_variance::{HALF_A_CODE, LevelVariance};
-use super::lines::DIVIDED_DRIFT;
 use super::moments::Equations;
 use super::photosite::Photosite;
 use super::pixel_gains::{PixelGains, phase_at};
@@ -19,12 +18,13 @@ use super::reading::ENDLESS;
 use super::repeated::average_of;
 use super::smooth_hue;
 use super::tapped_axis::Axis;
+use super::tapped_flat;
 use super::taps;
 use crate::camera::taps::Taps;
 use crate::cfa::Class;
 use crate::error::Result;
 use crate::frame::Geometry;
-use crate::metadata::{AdcRecord, AverageRecord, FrameHeader, NoiseRecord};
+use crate::metadata::{AdcRecord, AverageRecord, FrameHeader, Illumination, NoiseRecord};
 use crate::names::Named;
 use crate::random::Source;
 use crate::stages::demosaic::Method;
@@ -160,8 +160,8 @@ impl PixelNoise {
         })?;
         let method = Method::named(&record.method)
             .ok_or_else(|| frame.refuse(format!("it was demosaicked by `{}`, a method unknown here", record.method)))?;
-        let (photosite, black) = photosite_of(&taps::as_if_one(frame))?;
-        let largest = photosite.model.full_well_e * photosite.slope();
+        let (photosite, black) = photosite_of(&taps::as_one_reads(frame))?;
+        let largest = photosite.largest();
         let table = WeightTable::of(method, record.cfa);
         let [columns, rows] = places(frame, method.reach());
         let places = || rows.examples.iter().flat_map(|&y| columns.examples.iter().map(move |&x| [x, y]));
@@ -169,11 +169,10 @@ impl PixelNoise {
             places().map(|at| gains(table, at, &frame.geometry)).collect()
         };
         let is_followed = photosite.check_tails([0.0; 3]).and_then(|()| photosite.check_lines(false));
-        let light = metadata.correction.as_ref().and_then(|correction| correction.flat.as_ref()?.illumination.as_ref());
+        let light = flat_light(frame);
         is_followed.and_then(|()| photosite.check_flat_in(light)).map_err(|why| frame.refuse(why.to_string()))?;
-        if photosite.drifts() && photosite.flat.is_some() {
-            return Err(frame.refuse(DIVIDED_DRIFT));
-        }
+        let is_level_told = photosite.check_level_of_drift();
+        is_level_told.map_err(|why| frame.refuse(why.to_string()))?;
         let average = match &metadata.average {
             Some(record) => {
                 let record =
@@ -183,6 +182,7 @@ impl PixelNoise {
             }
             None => None,
         };
+        tapped_flat::check_flat(frame).map_err(|why| frame.refuse(why.to_string()))?;
         let kinds: Vec<[usize; 2]> = places().collect();
         let tap = tap_of_place(frame).filter(|_| frame.taps().is_some());
         let gain = |place: [isize; 2]| tap.as_ref().map_or(1.0, |tap| relative_slope(frame, tap(place)));
@@ -216,7 +216,7 @@ impl PixelNoise {
         let level = rgb.map(|sample| (sample - self.black) * share);
         let of_taps = self.of_taps.as_ref().map(|taps| (taps, taps.at(level)));
         let all = |mut variances: [f64; 3], hues: Option<[f64; 3]>| {
-            let lines = self.of_lines.as_ref().map(|lines| (lines, lines.at(level)));
+            let lines = self.of_lines.as_ref().map(|lines| (lines, lines.at(level, share)));
             let shared = lines.as_ref().map(|(lines, level)| lines.of_sites(level));
             if let Some(shared) = shared {
                 let off = |(variance, shared): (&mut f64, f64)| *variance = (*variance - shared).max(0.0);
@@ -285,7 +285,8 @@ fn places(frame: &FrameHeader, reach: usize) -> [Places; 2] {
 
 /// The slope of what an amplifier makes of the samples of a frame, relative to that of the sensor.
 fn relative_slope(frame: &FrameHeader, tap: usize) -> f64 {
-    let are_codes = quantity_of_sites(frame) == QuantityKind::Adu;
+    // Over a flat field gains come off.
+    let are_codes = quantity_of_sites(frame) == QuantityKind::Adu && tapped_flat::flat_of(frame).is_none();
     frame.taps().filter(|_| are_codes).map_or(1.0, |taps| taps.gain(tap))
 }
 
@@ -303,18 +304,23 @@ fn pixel_taps(
     average: Option<&AverageRecord>,
     one: &Photosite,
 ) -> Result<PixelTaps> {
-    if one.flat.is_some() {
-        return Err(frame.refuse(taps::FLATTENED));
+    let light = flat_light(frame);
+    if light.is_some() {
+        return Err(frame.refuse(tapped_flat::UNEVENLY_FLATTENED));
     }
     let tap = tap_of_place(frame).ok_or_else(|| frame.missing("sensor.readout"))?;
     let gains = examples.iter().map(|at| PixelGains::of_taps(table, *at, &frame.geometry, &tap)).collect();
     let (mut photosites, mut variances, mut shifts, mut slopes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for tap in 0..frame.taps().map_or(0, Taps::count) {
         let (photosite, _) = photosite_of(&taps::of_tap(frame, tap))?;
-        photosite.check_tails([0.0; 3]).map_err(|why| frame.refuse(why.to_string()))?;
-        let largest = photosite.model.full_well_e * photosite.slope();
+        let is_followed = photosite.check_tails([0.0; 3]).and_then(|()| photosite.check_flat());
+        is_followed.map_err(|why| frame.refuse(why.to_string()))?;
+        let largest = photosite.largest();
         slopes.push(relative_slope(frame, tap));
-        let shift = photosite.moments(0.0).moments.mean - one.moments(0.0).moments.mean;
+        let unlit = |photosite: &Photosite| {
+            photosite.moments(0.0).moments.mean * photosite.flat.map_or(1.0, |flat| flat.ratios[1])
+        };
+        let shift = unlit(&photosite) - unlit(one);
         shifts.push(shift);
         photosites.push((photosite, shift));
         variances.push(LevelVariance::of_classes(&photosite, average, largest));
@@ -323,6 +329,11 @@ fn pixel_taps(
     let of_lines = || PixelTapLines::of(photosites, average, table, &examples, &frame.geometry, &tap);
     let lines = if is_bent { of_lines() } else { None };
     Ok(PixelTaps { gains, variances, shifts, slopes, lines })
+}
+
+/// How the flat field was lit that divided a frame, where that was not even.
+fn flat_light(frame: &FrameHeader) -> Option<&Illumination> {
+    tapped_flat::flat_of(frame).and_then(|flat| flat.illumination.as_ref())
 }
 
 /// The photosites that a demosaicked frame was made of, and what no light reads in it, in the unit of its samples.

@@ -238,7 +238,8 @@ impl Photosite {
         let lines = match one.has_lines() {
             true => {
                 let [whole, fixed] = [one.lines(expected_e)?, one.fixed_lines(expected_e)?];
-                [0, 1, 2].map(|k| whole[k].less(&fixed[k]))
+                let scales = self.flat.map_or([1.0; 3], |flat| flat.ratios);
+                [0, 1, 2].map(|k| whole[k].less(&fixed[k]).scaled(scales.map(|scale| scales[k] * scale)))
             }
             false => [LineCovariance::default(); 3],
         };

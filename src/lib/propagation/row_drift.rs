@@ -1,21 +1,52 @@
 //! What a drift of the black level makes of sums over rows, over its places among the knots.
 //!
 //! Photosites of class k have κ_k times the drift of their row, so that a channel that gives a row the weights A_k has q = Σ κ_k A_k of it.
-//! Two channels have the covariance Σ_rs q_r q′_s c(r − s), c that of rows so far apart ([`drift::covariance`]), 1 of a row with itself.
+//! Two channels have the covariance Σ_rs q_r q′_s c(r − s), c that of rows so far apart ([`drift::covariance`]), 1 of a row with itself. Where a
+//! flat field divided them κ and q have two parts, of numbers that are independent, and q q′ is their product.
 
-use super::drift;
+use super::drift::{self, NUMBERS};
 use super::moments::SiteCovariance;
 use crate::stages::demosaic::stencil::REACH;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix3x2, RowVector2, Vector3};
 
 /// What the sites of a row, or column, give to the three channels, by classes.
 pub(super) type LineWeights = [[f64; 3]; 3];
 
+/// What a row gives to the three channels, by parts.
+pub(super) type Load = Matrix3x2<f64>;
+
+/// κ of classes that share so much of a drift in one row, and how many parts it has: D = κ κᵀ, by the largest of what is left first.
+fn loads(drift: &Matrix3<f64>) -> ([[f64; NUMBERS]; 3], usize) {
+    /// What is left of a matrix of one part is rounding.
+    const ROUNDING: f64 = 1e-12;
+    let scales = [0, 1, 2].map(|k| drift[(k, k)].max(0.0).sqrt());
+    let most = scales.into_iter().fold(0.0, f64::max).powi(2);
+    let left = Matrix3::from_fn(|k, l| drift[(k, l)] - scales[k] * scales[l]);
+    if left.amax() <= ROUNDING * most {
+        return (scales.map(|scale| [scale, 0.0]), 1);
+    }
+    let mut left = *drift;
+    let mut found = [[0.0; NUMBERS]; 3];
+    for part in 0..NUMBERS {
+        let largest = left.diagonal().imax();
+        let value = left[(largest, largest)];
+        if value <= ROUNDING * most {
+            return (found, part.max(1));
+        }
+        let column = left.column(largest) / value.sqrt();
+        (0..3).for_each(|k| found[k][part] = column[k]);
+        left -= column * column.transpose();
+    }
+    (found, NUMBERS)
+}
+
 /// The drift of photosites.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RowDrift {
-    /// Its rms in samples of each class.
-    pub scales: [f64; 3],
+    /// κ of each class.
+    pub loads: [[f64; NUMBERS]; 3],
+    /// How many of its parts are not zero in all.
+    pub rank: usize,
     /// Rows from one knot to the next.
     pub rows_per_knot: f64,
 }
@@ -23,13 +54,13 @@ pub(super) struct RowDrift {
 impl RowDrift {
     /// That of photosites of such covariances; none where they have none.
     pub fn of(sites: &SiteCovariance) -> Option<Self> {
-        let scales = [0, 1, 2].map(|k| sites.drift[(k, k)].max(0.0).sqrt());
-        sites.drifts().then_some(Self { scales, rows_per_knot: sites.drift_rows })
+        let (loads, rank) = loads(&sites.drift);
+        sites.drifts().then_some(Self { loads, rank, rows_per_knot: sites.drift_rows })
     }
 
     /// What a row gives to the channels.
-    pub fn load(&self, weights: &LineWeights) -> Vector3<f64> {
-        weights.iter().zip(self.scales).map(|(weights, scale)| scale * Vector3::from(*weights)).sum()
+    pub fn load(&self, weights: &LineWeights) -> Load {
+        weights.iter().zip(self.loads).map(|(weights, load)| Vector3::from(*weights) * RowVector2::from(load)).sum()
     }
 
     fn between(&self, rows_apart: isize) -> f64 {
@@ -37,10 +68,10 @@ impl RowDrift {
     }
 
     /// What rows that are not one add to the covariance of channels with others, of which both tell what each row gives.
-    pub fn apart(&self, first: &[(isize, Vector3<f64>)], second: &[(isize, Vector3<f64>)]) -> Matrix3<f64> {
-        let of = |(row, load): &(isize, Vector3<f64>)| -> Matrix3<f64> {
+    pub fn apart(&self, first: &[(isize, Load)], second: &[(isize, Load)]) -> Matrix3<f64> {
+        let of = |(row, load): &(isize, Load)| -> Matrix3<f64> {
             let others = second.iter().filter(|(other, _)| other != row);
-            let sum: Vector3<f64> = others.map(|(other, theirs)| self.between(row - other) * theirs).sum();
+            let sum: Load = others.map(|(other, theirs)| self.between(row - other) * theirs).sum();
             load * sum.transpose()
         };
         first.iter().map(of).sum()
@@ -48,7 +79,7 @@ impl RowDrift {
 
     /// What rows that are not one add to the covariance of the mean of a patch of so many rows, of which those that differ are told: all of a
     /// low one; of a high one the rims and two between, which stand for all there by turns.
-    pub fn apart_in_patch(&self, rows: &[(isize, Vector3<f64>)], height: usize) -> Matrix3<f64> {
+    pub fn apart_in_patch(&self, rows: &[(isize, Load)], height: usize) -> Matrix3<f64> {
         let margin = 2 * REACH.unsigned_abs();
         if rows.len() == height + margin {
             return self.apart(rows, rows);
@@ -76,8 +107,7 @@ impl RowDrift {
             } else {
                 first.max(last - farthest.cast_signed())..last
             };
-            let sum: Vector3<f64> =
-                near.map(|other| self.between(row - other) * turn((other - first).unsigned_abs())).sum();
+            let sum: Load = near.map(|other| self.between(row - other) * turn((other - first).unsigned_abs())).sum();
             let product = load * sum.transpose();
             covariance += product + product.transpose();
         }

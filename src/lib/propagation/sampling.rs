@@ -472,10 +472,11 @@ mod tests {
 
     /// Of each class so much more of the drift of its row, with so many rows from knot to knot.
     fn drifting(mut sites: [Prediction; 3], rows_per_knot: f64) -> [Prediction; 3] {
-        let scales = [0.9, 0.7, 0.8];
+        let (scales, others) = ([0.9, 0.7, 0.8], [-0.5, 0.3, 0.1]);
         for (k, site) in sites.iter_mut().enumerate() {
             let LineCovariance { row, drift, drift_rows, .. } = &mut site.lines;
-            (*drift, *drift_rows) = ([0, 1, 2].map(|l| scales[k] * scales[l]), rows_per_knot);
+            let shared = |l: usize| scales[k] * scales[l] + others[k] * others[l];
+            (*drift, *drift_rows) = ([0, 1, 2].map(shared), rows_per_knot);
             row.iter_mut().zip(*drift).for_each(|(row, drift)| *row += drift);
             site.moments.variance += drift[k];
         }

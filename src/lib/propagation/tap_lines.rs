@@ -7,9 +7,11 @@
 //!
 //! and so for columns. Where codes follow straight each has its own slope, g_ak g_bl \[σ² + E_k E_l s²].
 //!
-//! A drift of the black level is one number of a row, which all amplifiers meet with their slopes.
+//! A drift of the black level is one number of a row, which all amplifiers meet with their slopes; over a flat field that of the flat field
+//! is another.
 
 use super::bent_lines::BentLine;
+use super::drift::NUMBERS;
 use super::law::Law;
 use super::line_sums::{bent, curved};
 use super::lines::{Axis, DRIFT_CUT};
@@ -40,26 +42,41 @@ pub struct TapLines {
 /// The drift of the black level, which rows near each other share in part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TapDrift {
-    /// Its rms in the samples of a class of a group, where these stand in [`TapLines::row`].
-    pub scales: Vec<f64>,
+    /// What the samples of a class of a group have of its numbers, of variance 1, where these stand in [`TapLines::row`].
+    pub loads: Vec<[f64; NUMBERS]>,
     /// Rows from one knot to the next.
     pub rows_per_knot: f64,
 }
 
 impl TapDrift {
-    /// Of photosites of such moments behind each of some amplifiers; none where they do not drift.
-    fn of(moments: &[[Prediction; 3]]) -> Option<Self> {
+    /// Of photosites of such moments behind each of some amplifiers, of an average of exposures where there is one; none where they do not
+    /// drift.
+    fn of(sites: &[Lit], moments: &[[Prediction; 3]], average: Option<&AverageRecord>) -> Predicted<Option<Self>> {
         let lines =
             moments.iter().flat_map(|sites| [0, 1, 2].map(|k| (sites[k].lines.drift[k], sites[k].lines.drift_rows)));
         let (variances, rows): (Vec<f64>, Vec<f64>) = lines.unzip();
         let rows_per_knot = rows.into_iter().fold(0.0, f64::max);
-        let scales: Vec<f64> = variances.into_iter().map(|variance| variance.max(0.0).sqrt()).collect();
-        scales.iter().any(|scale| *scale > 0.0).then_some(Self { scales, rows_per_knot })
+        let mut loads: Vec<[f64; NUMBERS]> =
+            variances.into_iter().map(|variance| [variance.max(0.0).sqrt(), 0.0]).collect();
+        if sites.iter().any(|(photosite, _)| photosite.flat.is_some()) {
+            let slopes = sites.iter().map(|(photosite, expected_e)| photosite.line_slopes(*expected_e));
+            let slopes = slopes.collect::<Predicted<Option<Vec<_>>>>()?.unwrap_or_default();
+            let of_site = |((photosite, expected_e), [slopes, _]): (&Lit, [[f64; 3]; 2])| {
+                photosite.drift_loads(photosite.ratios(*expected_e), slopes, average)
+            };
+            loads = sites.iter().zip(slopes).flat_map(of_site).collect();
+        }
+        Ok(loads.iter().flatten().any(|load| *load != 0.0).then_some(Self { loads, rows_per_knot }))
     }
 
     /// What two photosites that stand at such places share in a row.
     pub fn between(&self, one: usize, other: usize) -> f64 {
-        self.scales[one] * self.scales[other]
+        self.loads[one].iter().zip(self.loads[other]).map(|(one, other)| one * other).sum()
+    }
+
+    /// How many numbers of a knot any of them has.
+    pub fn rank(&self) -> usize {
+        if self.loads.iter().any(|load| load[1] != 0.0) { NUMBERS } else { 1 }
     }
 }
 
@@ -82,13 +99,17 @@ impl TapLines {
         if let Some(record) = average {
             let one = sites.iter().map(|(photosite, expected_e)| (photosite.one_exposure(), *expected_e));
             let one: Vec<Lit> = one.collect();
-            let temporal = shared(&one)?.into_iter().zip(fixed(&one)?).map(|(whole, fixed)| whole - fixed);
+            let scale = |place: usize| sites[place / 3].0.flat.map_or(1.0, |flat| flat.ratios[place % 3]);
+            let of_samples = |anew: DMatrix<f64>| {
+                DMatrix::from_fn(anew.nrows(), anew.ncols(), |a, b| scale(a) * scale(b) * anew[(a, b)])
+            };
+            let temporal = shared(&one)?.into_iter().zip(fixed(&one)?).map(|(whole, fixed)| of_samples(whole - fixed));
             let off = 1.0 - 1.0 / f64::from(record.frames.max(1));
             whole.iter_mut().zip(temporal).for_each(|(whole, temporal)| *whole -= off * temporal);
         }
         let [row, column] = whole;
         let together = |sites: &[Prediction; 3]| Matrix3::from_fn(|k, l| sites[k].lines.together[l]);
-        let drift = TapDrift::of(moments);
+        let drift = TapDrift::of(sites, moments, average)?;
         let bent = bent_lines(sites, average.map(|record| record.frames))?;
         Ok(Some(Self { row, drift, column, together: moments.iter().map(together).collect(), bent }))
     }
@@ -175,6 +196,16 @@ fn bent_lines(sites: &[Lit], frames: Option<u32>) -> Predicted<[Option<BentLine>
     Ok([row?, column?])
 }
 
+/// Covariances in a row, or column, of photosites that were divided by one flat field, of such slopes.
+fn shared_by_quotients(sites: &[Lit], slopes: &[[[f64; 3]; 2]], axis: Axis) -> DMatrix<f64> {
+    let added: Vec<_> =
+        sites.iter().map(|(photosite, expected_e)| photosite.added_by(axis, *expected_e).unwrap_or_default()).collect();
+    DMatrix::from_fn(3 * sites.len(), 3 * sites.len(), |a, b| {
+        let [(one, k), (other, l)] = [a, b].map(|place| (place / 3, place % 3));
+        slopes[one][0][k] * slopes[other][0][l] * added[one].between([k, l], &added[other])
+    })
+}
+
 fn fixed(sites: &[Lit]) -> Predicted<[DMatrix<f64>; 2]> {
     let means = sites.iter().map(|(photosite, expected_e)| (photosite.over_exposures(), *expected_e));
     shared(&means.collect::<Vec<_>>())
@@ -187,6 +218,9 @@ fn shared(sites: &[Lit]) -> Predicted<[DMatrix<f64>; 2]> {
     let (Some(slopes), Some((first, _))) = (slopes, sites.first()) else {
         return Ok([curved(sites, &[Axis::Row])?, curved(sites, &[Axis::Column])?]);
     };
+    if first.flat.is_some() {
+        return Ok(Axis::ALL.map(|axis| shared_by_quotients(sites, &slopes, axis)));
+    }
     let signals: Vec<[f64; 3]> =
         sites.iter().map(|(photosite, expected_e)| photosite.line_signals(*expected_e)).collect();
     Ok(Axis::ALL.map(|axis| {

@@ -44,6 +44,8 @@ pub struct TappedPixels {
     /// By rows of kinds.
     pub(super) kinds: Vec<Kind>,
     pub(super) sampling: OnceLock<Sampling>,
+    /// The covariance of what all pixels are off together.
+    pub(super) level: Matrix3<f64>,
 }
 
 /// Pixels of one kind.
@@ -198,7 +200,15 @@ impl TappedPixels {
         let covariance = kinds.iter().map(of_kind).sum();
         let from_camera = kinds.iter().map(|kind| kind.share * kind.from_camera).sum();
         let (space, sampling) = (channels.space, OnceLock::new());
-        Ok(Self { mean, bias, covariance, groups: all, of_hue, from_camera, space, array, kinds, sampling })
+        let level = Matrix3::zeros();
+        Ok(Self { mean, bias, covariance, groups: all, of_hue, from_camera, space, array, kinds, sampling, level })
+    }
+
+    /// The same where all photosites of R, G and B are off together with such a covariance: each channel as the class that it is named for.
+    #[must_use]
+    pub(super) fn with_level(mut self, of_sites: &Matrix3<f64>) -> Self {
+        self.level = self.from_camera * of_sites * self.from_camera.transpose();
+        self
     }
 
     /// The same with mean and covariance of a large frame of one amplifier, of which these are the first order.

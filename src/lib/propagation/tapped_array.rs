@@ -1,6 +1,7 @@
 //! The photosites of a plane that several amplifiers have read, and the pixels that are made of them.
 
 use super::bent_lines::BentLine;
+use super::drift::NUMBERS;
 use super::moments::SiteCovariance;
 use super::smooth_hue::hues;
 use super::tap_lines::TapLines;
@@ -143,8 +144,9 @@ impl Array {
             let [tap, class] = self.of_site(at);
             counts.entry(tap).or_default()[class] += count;
         }
-        let of_scales = |scales: [f64; 3]| {
-            let drift_matrix = Matrix3::from_fn(|k, l| scales[k] * scales[l]);
+        let of_loads = |loads: [[f64; NUMBERS]; 3]| {
+            let between = |k: usize, l: usize| loads[k].iter().zip(loads[l]).map(|(one, other)| one * other).sum();
+            let drift_matrix = Matrix3::from_fn(between);
             let none = SiteCovariance::independent([0.0; 3]);
             SiteCovariance { row: drift_matrix, drift: drift_matrix, drift_rows: drift.rows_per_knot, ..none }
         };
@@ -152,14 +154,16 @@ impl Array {
         if self.taps.layout == TapLayout::Columns {
             let mean = |class: usize| {
                 let all: f64 = counts.values().map(|counts| counts[class]).sum();
-                let sum: f64 = counts.iter().map(|(tap, counts)| counts[class] * load(*tap, class)).sum();
-                if all > 0.0 { sum / all } else { 0.0 }
+                let sum = |part: usize| -> f64 {
+                    counts.iter().map(|(tap, counts)| counts[class] * load(*tap, class)[part]).sum()
+                };
+                std::array::from_fn(|part| if all > 0.0 { sum(part) / all } else { 0.0 })
             };
-            return vec![(1.0, of_scales([0, 1, 2].map(mean)))];
+            return vec![(1.0, of_loads([0, 1, 2].map(mean)))];
         }
         let all: f64 = counts.values().flatten().sum();
         let of_tap = |(tap, counts): (&usize, &[f64; 3])| {
-            (counts.iter().sum::<f64>() / all, of_scales([0, 1, 2].map(|class| load(*tap, class))))
+            (counts.iter().sum::<f64>() / all, of_loads([0, 1, 2].map(|class| load(*tap, class))))
         };
         counts.iter().map(of_tap).collect()
     }

@@ -1,7 +1,8 @@
 //! Sums over the pixels of a rectangle of what the drift of the black level makes of them, where several amplifiers have a part in them.
 //!
 //! A drift is a factor of each row ([`super::tapped_factors`]), but those of two rows are not independent: row r has Σ_m b_m(r) z_m of the
-//! numbers of knots ([`knots`]). Pixel a, which has ℓ_a(r) of the row, thus has V(a; m) = Σ_r ℓ_a(r) b_m(r) of the knot m, and
+//! numbers of knots ([`knots`]). Pixel a, which has ℓ_a(r) of the row, thus has V(a; m) = Σ_r ℓ_a(r) b_m(r) of the knot m; where there are two
+//! factors a knot has two numbers, one after another. And
 //!
 //! - T_ij(m, m′) = Σ_rr′ M_ij(r, r′) b_m(r) b_m′(r′), of what [`super::drift_bands`] tells the rest, M(r, r′) = Σ_a ℓ_a(r) ℓ_a(r′)ᵀ
 //! - with what a row r′ has otherwise, X_ij(m; r′) = Σ_r b_m(r) Σ_a ℓ_a,i(r) ℓ′_a,j(r′), and with columns likewise,
@@ -10,13 +11,13 @@
 //! What meets a drift only once, such as what is a photosite's own, meets its mean over rows that are else alike.
 
 use super::covariance::PAIRS;
-use super::drift_bands::{Bands, KNOTS};
+use super::drift_bands::{Bands, WIDTH};
 use super::line_sampling::add_both;
 use super::tapped::{Kind, TappedPixels};
 use super::tapped_factors::Drifting;
 use super::tapped_lines::{Lines, crossing};
 use crate::stages::noise::knots;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// What the pixels of a rectangle share of the drift of the black level.
 pub(super) struct DriftShares<'a> {
@@ -49,7 +50,7 @@ fn between((j, [a, b]): Knots, (k, [c, d]): Knots) -> f64 {
 struct Around {
     /// Covariances of lines as far away as a pixel reaches with those as far as another does that has photosites together with it.
     between: Vec<Vec<f64>>,
-    /// What a line so far away has together with the sum of all pixels, and with that of their distances.
+    /// What a line so far away has together with the sum of all pixels, and with that of their distances, by factor.
     sums: Vec<Vector3<f64>>,
     of_distances: Vec<Vector3<f64>>,
 }
@@ -66,7 +67,7 @@ impl<'a> DriftShares<'a> {
             (usize::try_from(knot - base).unwrap_or_default(), weights)
         });
         let knots: Vec<Knots> = of_lines.collect();
-        let length = knots.last().map_or(0, |(last, _)| last + KNOTS);
+        let length = knots.last().map_or(0, |(last, _)| last * lines.rank() + WIDTH);
         let reach = lines.reach;
         let (kinds, examples) = rows.alike(rows.lines.clone(), 3 * reach, true);
         let mut shares = Self {
@@ -79,8 +80,9 @@ impl<'a> DriftShares<'a> {
             knots,
         };
         for (index, (knot, weights)) in shares.knots.iter().enumerate() {
-            for (_, t) in shares.lines.total(shares.lines.first + index) {
-                (0..2).for_each(|p| shares.of_distances[knot + p] += weights[p] * t);
+            let rank = shares.lines.rank();
+            for (part, (_, t)) in shares.lines.total(shares.lines.first + index).iter().enumerate() {
+                (0..2).for_each(|p| shares.of_distances[(knot + p) * rank + part] += weights[p] * t);
             }
         }
         shares.add_around(examples.len());
@@ -97,10 +99,11 @@ impl<'a> DriftShares<'a> {
         let reach = self.lines.reach.cast_signed();
         let far = 3 * reach;
         let [near, all] = [2 * reach + 1, 2 * far + 1].map(isize::cast_unsigned);
+        let rank = self.lines.rank();
         let none = || Around {
             between: vec![vec![0.0; all]; near],
-            sums: vec![Vector3::zeros(); near],
-            of_distances: vec![Vector3::zeros(); near],
+            sums: vec![Vector3::zeros(); near * rank],
+            of_distances: vec![Vector3::zeros(); near * rank],
         };
         let mut around: Vec<Around> = (0..kinds).map(|_| none()).collect();
         let mut counts = vec![0.0; kinds];
@@ -116,8 +119,11 @@ impl<'a> DriftShares<'a> {
                 }
                 let (knot, weights) = mine;
                 for (knot, weight) in (knot..).zip(weights) {
-                    around[*kind].sums[place] += weight * self.bands.sums[knot];
-                    around[*kind].of_distances[place] += weight * self.of_distances[knot].diagonal();
+                    for part in 0..rank {
+                        let [to, from] = [place * rank + part, knot * rank + part];
+                        around[*kind].sums[to] += weight * self.bands.sums[from];
+                        around[*kind].of_distances[to] += weight * self.of_distances[from].diagonal();
+                    }
                 }
             }
         }
@@ -159,9 +165,10 @@ impl<'a> DriftShares<'a> {
         let (mut found, mut moved) = (Matrix3::zeros(), [0.0; 3]);
         let Some(loads) = self.lines.loads(pixel) else { return (found, moved) };
         for (place, offset) in (-reach..=reach).enumerate() {
-            for load in loads.at(offset) {
-                found += Vector3::from(*load) * around.sums[place].transpose();
-                (0..3).for_each(|i| moved[i] += load[i] * around.of_distances[place][i]);
+            for (part, load) in loads.at(offset).iter().enumerate() {
+                let from = place * self.lines.rank() + part;
+                found += Vector3::from(*load) * around.sums[from].transpose();
+                (0..3).for_each(|i| moved[i] += load[i] * around.of_distances[from][i]);
             }
         }
         (found, moved)
@@ -232,9 +239,12 @@ impl<'a> DriftShares<'a> {
         for (kind, (line, _)) in rows.examples.iter().enumerate().filter(|_| rows.rank() > 0) {
             let of_line = |near: usize| {
                 let gram = self.lines.gram_with(rows, pixels, [near, *line]);
-                let of_factor =
-                    |factor: usize| PAIRS.map(|[i, j]| gram[(i, 3 * factor + j)] + gram[(j, 3 * factor + i)]);
-                (near.cast_signed() - line.cast_signed(), (0..rows.rank()).map(of_factor).collect::<Vec<_>>())
+                let of_factor = |index: usize| {
+                    let [part, factor] = [index / rows.rank(), index % rows.rank()].map(|at| 3 * at);
+                    PAIRS.map(|[i, j]| gram[(part + i, factor + j)] + gram[(part + j, factor + i)])
+                };
+                let both = self.lines.rank() * rows.rank();
+                (near.cast_signed() - line.cast_signed(), (0..both).map(of_factor).collect::<Vec<_>>())
             };
             let near: Vec<(isize, Vec<[f64; 6]>)> = rows.near(*line, far).map(of_line).collect();
             for (offset, mine) in &near {
@@ -246,7 +256,7 @@ impl<'a> DriftShares<'a> {
                             Some(between(at(*offset)?, at(*other)?))
                         })
                         .sum();
-                    for ((mine, theirs), value) in mine.iter().zip(theirs).zip(&rows.factors.values) {
+                    for ((mine, theirs), value) in mine.iter().zip(theirs).zip(rows.factors.values.iter().cycle()) {
                         add_outer(found, mine, theirs, shared * value);
                     }
                 }
@@ -259,7 +269,8 @@ impl<'a> DriftShares<'a> {
             return;
         }
         let kinds = self.lines.examples.len();
-        let mut sums = vec![vec![0.0; self.bands.sums.len()]; kinds];
+        let knots = self.knots.last().map_or(0, |(last, _)| last + 2);
+        let mut sums = vec![vec![0.0; knots]; kinds];
         for (kind, (knot, weights)) in self.lines.kinds.iter().zip(&self.knots) {
             (0..2).for_each(|p| sums[*kind][knot + p] += weights[p]);
         }
@@ -268,7 +279,8 @@ impl<'a> DriftShares<'a> {
         for (column, times) in &columns.examples {
             let of_kind = |(line, _): &(usize, f64)| crossing(pixels, [&self.lines, columns], [*line, *column]);
             let all: Vec<Vec<[f64; 6]>> = self.lines.examples.iter().map(of_kind).collect();
-            for (factor, value) in columns.factors.values.iter().enumerate() {
+            let values = columns.factors.values.iter().cycle().take(self.lines.rank() * columns.rank());
+            for (factor, value) in values.enumerate() {
                 for (mine, of_mine) in all.iter().zip(&shared) {
                     let mut together = [0.0; 6];
                     for (theirs, shared) in all.iter().zip(of_mine) {
@@ -291,18 +303,16 @@ fn add_outer(found: &mut [[f64; 6]; 6], mine: &[f64; 6], theirs: &[f64; 6], time
 fn bands(pixels: &TappedPixels, lines: &Lines<'_>, knots: &[Knots], length: usize) -> Bands {
     let mut bands = Bands::zero(length);
     let far = 2 * lines.reach;
-    let gram = |line: usize, near: usize| {
-        let gram = lines.gram_with(lines, pixels, [line, near]);
-        Matrix3::from_fn(|i, j| if gram.is_empty() { 0.0 } else { gram[(i, j)] })
-    };
-    let of_example = |(line, _): &(usize, f64)| -> Vec<(isize, Matrix3<f64>)> {
+    let rank = lines.rank();
+    let of_example = |(line, _): &(usize, f64)| -> Vec<(isize, DMatrix<f64>)> {
         let near = lines.near(*line, far);
-        near.map(|near| (near.cast_signed() - line.cast_signed(), gram(*line, near))).collect()
+        let gram = |near: usize| lines.gram_with(lines, pixels, [*line, near]);
+        near.map(|near| (near.cast_signed() - line.cast_signed(), gram(near))).collect()
     };
-    let grams: Vec<Vec<(isize, Matrix3<f64>)>> = lines.examples.iter().map(of_example).collect();
+    let grams: Vec<Vec<(isize, DMatrix<f64>)>> = lines.examples.iter().map(of_example).collect();
     for (index, (kind, (knot, weights))) in lines.kinds.iter().zip(knots).enumerate() {
-        for (total, _) in &lines.totals[*kind] {
-            (0..2).for_each(|p| bands.sums[knot + p] += weights[p] * Vector3::from(*total));
+        for (part, (total, _)) in lines.totals[*kind].iter().enumerate() {
+            (0..2).for_each(|p| bands.sums[(knot + p) * rank + part] += weights[p] * Vector3::from(*total));
         }
         for (lag, gram) in &grams[*kind] {
             let Some((other, of_other)) = index.checked_add_signed(*lag).and_then(|index| knots.get(index)) else {
@@ -310,8 +320,11 @@ fn bands(pixels: &TappedPixels, lines: &Lines<'_>, knots: &[Knots], length: usiz
             };
             for (m, mine) in (*knot..).zip(weights) {
                 for (n, theirs) in (*other..).zip(of_other) {
-                    if let Some(band) = n.checked_sub(m).and_then(|apart| bands.products[m].get_mut(apart)) {
-                        *band += mine * theirs * gram;
+                    for [a, b] in (0..rank * rank).map(|index| [index / rank, index % rank]) {
+                        let [from, to] = [m * rank + a, n * rank + b];
+                        if let Some(band) = to.checked_sub(from).and_then(|apart| bands.products[from].get_mut(apart)) {
+                            *band += mine * theirs * gram.fixed_view::<3, 3>(3 * a, 3 * b);
+                        }
                     }
                 }
             }

@@ -4,10 +4,10 @@
 //! The covariance R of two photosites of a row, by amplifiers and classes, is Σ_ρ λ_ρ u_ρ u_ρᵀ. Pixel a has of the factor ρ of row r what its
 //! photosites there have, ℓ_a(r, ρ) = Σ_s w_a(s) u_ρ(s); so pixels a and b, however far apart in it, share Σ_rρ λ_ρ ℓ_a(r, ρ) ℓ_b(r, ρ)ᵀ.
 //!
-//! A drift of the black level is one factor more, of which rows near each other have a part in common: on average over their places
+//! A drift of the black level is one factor more, or over a flat field two, of which rows near each other have a part in common: on average over their places
 //! c(r − r′) of it ([`super::drift::covariance`]).
 
-use super::drift;
+use super::drift::{self, NUMBERS};
 use super::moments::Prediction;
 use super::tap_lines::TapLines;
 use crate::stages::demosaic::stencil::REACH;
@@ -54,9 +54,16 @@ impl Factors {
         Self { values: Vec::new(), loads: Vec::new() }
     }
 
-    /// What a photosite of an amplifier and class has of the first.
-    pub fn load(&self, tap: usize, class: usize) -> f64 {
-        self.loads.first().and_then(|loads| loads.get(3 * tap + class)).copied().unwrap_or_default()
+    /// So many of variance 1, of which photosites have so much by amplifier and class.
+    pub fn several(rank: usize, taps: usize, load: impl Fn(usize, usize) -> [f64; NUMBERS]) -> Self {
+        let loads = |part: usize| (0..3 * taps).map(|at| load(at / 3, at % 3)[part]).collect();
+        Self { values: vec![1.0; rank], loads: (0..rank).map(loads).collect() }
+    }
+
+    /// What a photosite of an amplifier and class has of the first few.
+    pub fn load(&self, tap: usize, class: usize) -> [f64; NUMBERS] {
+        let part = |part: usize| self.loads.get(part).and_then(|loads| loads.get(3 * tap + class)).copied();
+        std::array::from_fn(|index| part(index).unwrap_or_default())
     }
 
     /// What pixels have of each, `sites` being their photosites: how many lines they are away, of which amplifier and class, and their
@@ -87,7 +94,7 @@ fn number_of(taps: &[usize]) -> usize {
     3 * taps.iter().map(|tap| tap + 1).max().unwrap_or_default()
 }
 
-/// A drift of the black level, as one factor of each row.
+/// A drift of the black level, as factors of each row.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Drifting {
     /// Of variance 1.
@@ -100,14 +107,14 @@ impl Drifting {
     /// What a pixel shares with itself of such loads by rows, on average over their places.
     fn covariance(&self, loads: &Loads) -> Matrix3<f64> {
         let each =
-            || (-REACH..=REACH).flat_map(|row| loads.at(row).iter().map(move |load| (row, Vector3::from(*load))));
-        let of = |(row, load): (isize, Vector3<f64>)| -> Matrix3<f64> {
+            |part: usize| (-REACH..=REACH).filter_map(move |row| Some((row, Vector3::from(*loads.at(row).get(part)?))));
+        let of = |part: usize, (row, load): (isize, Vector3<f64>)| -> Matrix3<f64> {
             let with = |(other, theirs): (isize, Vector3<f64>)| {
                 drift::covariance((row - other) as f64 / self.rows_per_knot) * theirs
             };
-            load * each().map(with).sum::<Vector3<f64>>().transpose()
+            load * each(part).map(with).sum::<Vector3<f64>>().transpose()
         };
-        each().map(of).sum()
+        (0..self.factors.values.len()).flat_map(|part| each(part).map(move |load| of(part, load))).sum()
     }
 }
 
@@ -127,8 +134,8 @@ impl Shared {
         let alone = DMatrix::from_fn(row.nrows(), row.ncols(), |a, b| lines.row_alone(a, b));
         let drift = lines.drift.as_ref().map(|drift| {
             let group = |tap: usize| taps.iter().position(|of| *of == tap);
-            let load = |tap, class| group(tap).map_or(0.0, |group| drift.scales[3 * group + class]);
-            let factors = Factors::single(number_of(taps) / 3, load);
+            let load = |tap, class| group(tap).map_or([0.0; NUMBERS], |group| drift.loads[3 * group + class]);
+            let factors = Factors::several(drift.rank(), number_of(taps) / 3, load);
             Drifting { factors, rows_per_knot: drift.rows_per_knot }
         });
         let lines = [Factors::of(alone, row.amax(), taps), Factors::of(column.clone(), column.amax(), taps)];

@@ -48,7 +48,10 @@ struct Sums {
 impl TappedPixels {
     /// How the sample means and covariances of the rectangle scatter; worked out once.
     pub fn sampling(&self) -> &Sampling {
-        self.sampling.get_or_init(|| Sums::of(self).sampling(self.count(), &self.beyond_normal()))
+        self.sampling.get_or_init(|| {
+            let found = Sums::of(self).sampling(self.count(), &self.beyond_normal());
+            Sampling { mean_covariance: found.mean_covariance + self.level, ..found }
+        })
     }
 }
 
@@ -297,10 +300,11 @@ mod tests {
 
     /// What photosites of as many amplifiers share, which differ by a share in what they make of it: of ranks 2 and 3.
     fn lines(count: usize, by: f64, drifts: bool) -> TapLines {
-        let scale = |place: usize| (1.0 + 0.3 * by * (place / 3) as f64) * [0.9, 1.2, 0.6][place % 3];
-        let scales: Vec<f64> = (0..3 * count).map(scale).collect();
-        let of_drift = DMatrix::from_fn(3 * count, 3 * count, |a, b| if drifts { scales[a] * scales[b] } else { 0.0 });
-        let drift = drifts.then_some(TapDrift { scales, rows_per_knot: ROWS_PER_KNOT });
+        let scale = |place: usize| 1.0 + 0.3 * by * (place / 3) as f64;
+        let load = |place: usize| [[0.9, 1.2, 0.6][place % 3], [-0.5, 0.3, 0.7][place % 3]].map(|k| k * scale(place));
+        let drift = TapDrift { loads: (0..3 * count).map(load).collect(), rows_per_knot: ROWS_PER_KNOT };
+        let of_drift = DMatrix::from_fn(3 * count, 3 * count, |a, b| if drifts { drift.between(a, b) } else { 0.0 });
+        let drift = drifts.then_some(drift);
         let load = |axis: usize, place: usize| {
             let (more, k) = (by * (place / 3) as f64, place % 3);
             let gain = 1.0 + 0.3 * more;

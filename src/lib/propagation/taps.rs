@@ -3,14 +3,18 @@
 //! Behind one amplifier a photosite is as any other, with the slope, the bias and the read noise of that. Over a frame or a region
 //! photosites are groups of known sizes, one for each amplifier, and not drawn among them.
 
+use super::divided::NOISY;
+use super::divided_drift::pattern_of;
 use super::drift;
-use super::moments::{Equations, LineCovariance, Prediction};
+use super::moments::{Equations, LineCovariance, Prediction, common};
 use super::tap_lines::{Lit, TapLines};
+use super::tapped_flat::{check_flat, flat_of};
+use super::tapped_level::{self, Behind, Rectangle};
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::taps::TapLayout;
 use crate::cfa::{CfaPattern, Class};
 use crate::frame::Geometry;
-use crate::metadata::{AverageRecord, FrameHeader};
+use crate::metadata::{AdcRecord, AverageRecord, FlatRecord, FrameHeader};
 use crate::names::Named;
 use crate::numerics::normal::MeanVariance;
 use crate::stages::demosaic::Method;
@@ -25,10 +29,6 @@ const MIXED: &str = "several amplifiers (`taps` of the sensor) have read it, and
 /// The same where they read columns by turns.
 const MIXED_BY_TURNS: &str = "several amplifiers (`taps` of the sensor) have read its columns by turns, and this is told of frames that one \
                               alone has read";
-
-/// Why nothing is said of flat fields.
-pub(super) const FLATTENED: &str = "it was divided by a flat field of a sensor that is read through several amplifiers (`taps`), and how their \
-                         gains come off is not predicted";
 
 /// Whether amplifiers read the columns of a frame by turns.
 pub(super) fn are_by_turns(frame: &FrameHeader) -> bool {
@@ -53,6 +53,8 @@ pub struct TappedSites {
     pub lines: Option<Box<TapLines>>,
     /// Where they are.
     pub cells: Cells,
+    /// The covariance of what all samples of R, G and B are off together.
+    pub level: Matrix3<f64>,
 }
 
 /// Photosites by rows and columns that are alike.
@@ -132,6 +134,13 @@ impl Cells {
 }
 
 impl TappedSites {
+    /// The shares of all photosites that are of R, G and B.
+    pub fn shares(&self) -> [f64; 3] {
+        let counts = [0, 1, 2].map(|k| self.groups.iter().map(|group| group.counts[k]).sum::<f64>());
+        let all: f64 = counts.iter().sum();
+        counts.map(|count| if all > 0.0 { count / all } else { 0.0 })
+    }
+
     fn share(&self, group: usize, class: usize) -> f64 {
         let all: f64 = self.groups.iter().map(|group| group.counts[class]).sum();
         if all > 0.0 { self.groups[group].counts[class] / all } else { 0.0 }
@@ -223,6 +232,11 @@ pub(super) struct Part {
 pub(super) fn of_tap(frame: &FrameHeader, tap: usize) -> FrameHeader {
     let mut made = frame.clone();
     let taps = frame.taps().cloned();
+    let of_all = made.metadata.adc.or_else(|| frame.readout().ok().map(AdcRecord::of_readout));
+    let flat = made.metadata.correction.as_mut().and_then(|correction| correction.flat.as_mut());
+    if let (Some(flat), Some(adc), Some(taps)) = (flat, of_all, &taps) {
+        flat.converters = (0..flat.tap_photosites.len()).map(|tap| adc.of_tap(taps, tap)).collect();
+    }
     if let (Some(adc), Some(taps)) = (&mut made.metadata.adc, taps) {
         *adc = adc.of_tap(&taps, tap);
     }
@@ -242,6 +256,14 @@ pub(super) fn as_if_one(frame: &FrameHeader) -> Cow<'_, FrameHeader> {
         readout.taps = None;
     }
     Cow::Owned(made)
+}
+
+/// The same; what several divided by a flat field as the first of them reads it, whose samples all have the same slope.
+pub(super) fn as_one_reads(frame: &FrameHeader) -> Cow<'_, FrameHeader> {
+    match frame.taps().and_then(|_| flat_of(frame)) {
+        Some(_) => Cow::Owned(of_tap(frame, 0)),
+        None => as_if_one(frame),
+    }
 }
 
 /// Lines of a frame that are alike: one of them, and how many there are; and of which kind each is.
@@ -329,7 +351,7 @@ pub(super) fn with_footprint(frame: &FrameHeader) -> Cow<'_, FrameHeader> {
 /// Whether a frame is of pixels that several amplifiers have a part in.
 pub(super) fn are_mixed(frame: &FrameHeader) -> bool {
     let is_demosaicked = frame.taps().is_some() && frame.metadata.demosaic.is_some();
-    is_demosaicked && parts(&with_footprint(frame)).len() > 1
+    is_demosaicked && (flat_of(frame).is_some() || parts(&with_footprint(frame)).len() > 1)
 }
 
 /// The frame as the one amplifier reads it that reads all of its photosites, those included that its pixels are made of.
@@ -341,9 +363,7 @@ pub(super) fn of_one(frame: &FrameHeader) -> Predicted<Cow<'_, FrameHeader>> {
     if frame.taps().is_none() {
         return Ok(Cow::Borrowed(frame));
     }
-    if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
-        return Err(Unpredictable::Beyond(FLATTENED));
-    }
+    check_flat(frame)?;
     let geometry = frame.geometry.clone();
     match &mut parts(&with_footprint(frame))[..] {
         [one] => Ok(Cow::Owned(FrameHeader { geometry, ..one.frame.clone() })),
@@ -365,14 +385,13 @@ pub(super) fn sites(
     if frame.taps().is_none() || frame.metadata.demosaic.is_some() {
         return Ok(None);
     }
-    if frame.metadata.correction.as_ref().is_some_and(|correction| correction.flat.is_some()) {
-        return Err(Unpredictable::Beyond(FLATTENED));
-    }
-    let parts = parts(frame);
-    let Some((_, cells)) = cells(frame).filter(|_| parts.len() > 1) else { return Ok(None) };
+    check_flat(frame)?;
+    let (parts, flat) = (parts(frame), flat_of(frame));
+    let Some((_, cells)) = cells(frame).filter(|_| parts.len() > 1 || flat.is_some()) else { return Ok(None) };
     let (mut groups, mut lit, mut average) = (Vec::new(), Vec::new(), None);
     for Part { counts, frame, .. } in parts {
         let (photosite, sites, of_average) = sites(&frame, equations)?;
+
         groups.push(Group { counts, sites });
         lit.push(photosite);
         average = of_average;
@@ -380,10 +399,51 @@ pub(super) fn sites(
     let moments: Vec<[Prediction; 3]> = groups.iter().map(|group| group.sites).collect();
     let is_shared = moments.iter().flatten().any(|site| site.lines != LineCovariance::default());
     let lines = if is_shared { TapLines::of(&lit, &moments, average.as_ref())? } else { None };
-    Ok(Some(TappedSites { groups, lines: lines.map(Box::new), cells }))
+    let level = match flat {
+        Some(flat) => level_of_flat(frame, flat, |frame| {
+            let (lit, moments, _) = sites(frame, equations)?;
+            Ok((lit, moments))
+        })?,
+        None => level(&groups),
+    };
+    Ok(Some(TappedSites { groups, lines: lines.map(Box::new), cells, level }))
 }
 
-/// Photosites of a frame that one amplifier reads, of such moments, as one group; none where they do not follow what they share on a curve.
+/// The covariance of what all samples of R, G and B are off together that several amplifiers have read, and that such a flat field divided, by
+/// `sites` of a frame that one amplifier reads.
+///
+/// # Errors
+///
+/// Those of `sites`, and [`Unpredictable::Beyond`] where no formula tells.
+pub(super) fn level_of_flat(
+    frame: &FrameHeader,
+    flat: &FlatRecord,
+    sites: impl Fn(&FrameHeader) -> Predicted<(Lit, [Prediction; 3])>,
+) -> Predicted<Matrix3<f64>> {
+    let readout = frame.readout().map_err(|_| Unpredictable::Missing("sensor.readout"))?;
+    let pattern = pattern_of(frame);
+    let rectangle = |area: [i64; 4]| Rectangle::of(readout, pattern, area);
+    let has_read = |tap: &usize| flat.tap_photosites[*tap].iter().any(|count| *count > 0);
+    let behind = |tap: usize| {
+        let (lit, moments) = sites(&of_tap(frame, tap))?;
+        Ok(Behind { tap, lit, means: moments.map(|site| site.moments.mean) })
+    };
+    let all = (0..flat.tap_photosites.len()).filter(has_read).map(behind).collect::<Predicted<Vec<_>>>()?;
+    let here = rectangle(frame.geometry.on_sensor());
+    let of_level = flat.area.map_or_else(|| rectangle(frame.geometry.on_sensor()), rectangle);
+    tapped_level::level(flat, [&here, &of_level], &all).ok_or(Unpredictable::Beyond(NOISY))
+}
+
+/// The covariance of what all samples of R, G and B are off together, of photosites of one group; several have none.
+pub(super) fn level(groups: &[Group]) -> Matrix3<f64> {
+    match groups {
+        [one] => common(&one.sites),
+        _ => Matrix3::zeros(),
+    }
+}
+
+/// Photosites of a frame that one amplifier reads, of such moments, as one group; none where they do not follow what they share on a curve,
+/// unless `always`.
 ///
 /// # Errors
 ///
@@ -393,12 +453,15 @@ pub(super) fn one_group(
     lit: &Lit,
     sites: [Prediction; 3],
     average: Option<&AverageRecord>,
+    always: bool,
 ) -> Predicted<Option<TappedSites>> {
-    let lines = TapLines::of(std::slice::from_ref(lit), &[sites], average)?.filter(TapLines::are_bent);
+    let lines = TapLines::of(std::slice::from_ref(lit), &[sites], average)?;
+    let lines = lines.filter(|lines| always || lines.are_bent());
     let (Some(lines), Some((_, cells))) = (lines, all_cells(frame)) else { return Ok(None) };
     let count = |class: Class| cells.all.iter().filter(|cell| cell.has(class)).map(|cell| cells.count(cell)).sum();
     let groups = vec![Group { counts: Class::ALL.map(count), sites }];
-    Ok(Some(TappedSites { groups, lines: Some(Box::new(lines)), cells }))
+    let level = level(&groups);
+    Ok(Some(TappedSites { groups, lines: Some(Box::new(lines)), cells, level }))
 }
 
 /// Mean, variance and third cumulant of photosites of groups taken together, by classes; their excess kurtosis is what they have on

@@ -287,7 +287,18 @@ fn sampling_of(sites: &TappedSites, seen: Seen) -> Sampling {
         Seen::Class(class) => groups::of_class(&sites.groups, class as usize),
         Seen::All => groups::of_plane(&sites.groups),
     };
-    sites.lines.as_ref().map_or_else(|| groups::sampling(&parts()), |lines| cells::sampling(sites, lines, seen))
+    let found =
+        sites.lines.as_ref().map_or_else(|| groups::sampling(&parts()), |lines| cells::sampling(sites, lines, seen));
+    let of_classes = |weights: [f64; 3]| {
+        let weights = Vector3::from(weights);
+        Matrix3::from_element(weights.dot(&(sites.level * weights)))
+    };
+    let level = match seen {
+        Seen::Planes => sites.level,
+        Seen::Class(class) => of_classes([0, 1, 2].map(|k| if k == class as usize { 1.0 } else { 0.0 })),
+        Seen::All => of_classes(sites.shares()),
+    };
+    Sampling { mean_covariance: found.mean_covariance + level, ..found }
 }
 
 /// The prediction for samples of three classes, so many of each, taken as those of one variable; none of none.

@@ -120,6 +120,11 @@ pub struct WeightTable {
 }
 
 impl WeightTable {
+    /// The pattern of the plane.
+    pub fn pattern(&self) -> CfaPattern {
+        self.pattern
+    }
+
     /// The weights of `method` on an array of `pattern`, worked out once.
     pub fn of(method: Method, pattern: CfaPattern) -> &'static Self {
         static TABLES: [[OnceLock<Box<WeightTable>>; CfaPattern::ALL.len()]; Method::ALL.len()] =

@@ -12,6 +12,8 @@ pub struct FlatMeans {
     pub(super) left_out: Vec<u64>,
     /// How many rows and columns of cells these are.
     pub(super) cell_lines: Option<[f64; 2]>,
+    /// How many of these photosites each of several amplifiers has read.
+    pub(super) tap_photosites: Vec<Vec<u64>>,
     /// Photosites that are saturated in a flat.
     pub full: u64,
     /// What F scatters by from photosite to photosite, noise and response, in shares of the mean; of the class where that is most.

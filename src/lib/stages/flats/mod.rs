@@ -269,6 +269,7 @@ impl<S: RowSource> FlatFrames<S> {
             }
         }
         tally.take_line();
+        let readout = self.head.readout().ok().filter(|readout| readout.taps.is_some());
         for (row, plane) in lines {
             let of_row = self.classes.row(first + row, plane);
             tally.last.fill(None);
@@ -283,6 +284,10 @@ impl<S: RowSource> FlatFrames<S> {
                 for (x, flat) in (cell * columns..).zip(flats) {
                     let class = of_row[x % of_row.len()];
                     tally.take(class, of_rows + (x + x0) % 2, *flat);
+                    if let Some(readout) = readout {
+                        let [first_x, first_y] = self.head.geometry.origin.map(i64::from);
+                        tally.take_tap(readout.tap([first_x + x as i64, first_y + (first + row) as i64]), class);
+                    }
                 }
             }
         }
@@ -330,7 +335,7 @@ impl<S: RowSource> FlatFrames<S> {
         let left_out = good.iter().zip(counts).map(|(good, count)| good - count).collect();
         let doubt = self.doubt_of_array(tally);
         let illumination = tally.blocks.illumination(&means);
-        let cell_lines = tally.cell_lines();
+        let (cell_lines, tap_photosites) = (tally.cell_lines(), tally.taps.clone());
         let full = full.iter().sum();
         let share = |class: usize| Some(tally.scatter(class)? / means[class]).filter(|_| counts[class] > 0);
         let scatter = (0..self.classes.count()).filter_map(share).fold(0.0, f64::max);
@@ -339,6 +344,7 @@ impl<S: RowSource> FlatFrames<S> {
             photosites: counts.clone(),
             left_out,
             cell_lines,
+            tap_photosites,
             full,
             scatter,
             limits,
@@ -381,6 +387,9 @@ impl<S: RowSource> FlatFrames<S> {
             photosites: means.photosites.clone(),
             left_out: means.left_out.clone(),
             cell_lines: means.cell_lines,
+            area: Some(self.head.geometry.on_sensor()),
+            tap_photosites: means.tap_photosites.clone(),
+            converters: Vec::new(),
             even: self.is_even,
             illumination: (!self.is_even).then(|| means.illumination.clone()),
             exposure_s: metadata.time_s(),

@@ -22,6 +22,8 @@ pub(super) struct Tally {
     rows: [f64; 2],
     /// Whole cells in each column of cells.
     columns: Vec<f64>,
+    /// Photosites of each class in whole cells that each of several amplifiers has read.
+    pub(super) taps: Vec<Vec<u64>>,
     /// Sums over the photosites at each place of the 2×2 at the sensor's corner, in whole cells, and how many.
     places: [(f64, f64); 4],
     /// Sums over the photosites of whole cells by where they are.
@@ -42,6 +44,7 @@ impl Tally {
             whole: Vec::new(),
             rows: [0.0; 2],
             columns: Vec::new(),
+            taps: Vec::new(),
             places: [(0.0, 0.0); 4],
             blocks,
         }
@@ -58,6 +61,13 @@ impl Tally {
             let [sum, count] = self.changes[class];
             self.changes[class] = [sum + (flat - before).abs(), count + 1.0];
         }
+    }
+
+    /// Takes in that an amplifier has read a photosite of a class in a whole cell.
+    pub(super) fn take_tap(&mut self, tap: usize, class: usize) {
+        let classes = self.sums.len();
+        self.taps.resize(self.taps.len().max(tap + 1), vec![0; classes]);
+        self.taps[tap][class] += 1;
     }
 
     /// Takes in which cells of a row of cells are whole.
