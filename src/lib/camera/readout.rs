@@ -496,7 +496,10 @@ pub(crate) mod tests {
         assert!(complaint(ReadOut { read_noise_e: f64::NAN, ..kaf5101ce() }).contains("read_noise_e"));
         assert!(complaint(ReadOut { adu_per_e: 0.0, ..kaf5101ce() }).contains("adu_per_e"));
         assert!(complaint(ReadOut { bits: 17, ..kaf5101ce() }).contains("bits"));
-        assert!(complaint(ReadOut { dark_current_na_per_cm2: None, ..kaf5101ce() }).contains("one of"));
+        assert!(
+            complaint(ReadOut { dark_current_na_per_cm2: None, ..kaf5101ce() })
+                .contains("it must have `dark_current_na_per_cm2` or")
+        );
         assert!(complaint(ReadOut { pixel_pitch_um: Some(0.0), ..kaf5101ce() }).contains("pixel_pitch_um"));
         assert!(complaint(ReadOut { pixel_pitch_um: None, ..kaf5101ce() }).contains("needs `pixel_pitch_um`"));
         assert_eq!(kaf5101ce().check(), Ok(()));

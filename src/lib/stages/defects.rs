@@ -55,7 +55,9 @@ impl<S: RowSource> DefectMap<S> {
             let line = whole.split('#').next().unwrap_or_default().trim();
             if line.is_empty() {
                 let comment = whole.trim_start_matches([' ', '\t', '#']);
-                is_by_row = begins_with_row(comment).filter(|_| may_be_heading).unwrap_or(is_by_row);
+                // More than two words are prose.
+                let is_heading = may_be_heading && words(comment).count() == 2;
+                is_by_row = begins_with_row(comment).filter(|_| is_heading).unwrap_or(is_by_row);
                 continue;
             }
             if std::mem::take(&mut may_be_heading) && is_heading(line) {
@@ -469,9 +471,13 @@ mod tests {
         ] {
             assert_eq!(found(&format!("{heading}6,5\n")), "5,6", "{heading}");
         }
-        for heading in ["i,j\n", "x,x\n", "defects\n", "row,column,level\n"] {
+        for heading in ["i,j\n", "x,x\n", "defects\n", "level,row,column\n"] {
             assert!(found(&format!("{heading}6,5\n")).contains("does not tell columns from rows"), "{heading}");
         }
+        // More columns count for nothing where the heading names them, and are refused where it does not.
+        assert_eq!(found("row,column,kind\n6,5,hot\n"), "5,6");
+        assert!(found("6,5,hot\n").contains("line 1, `6,5,hot`, is no column and row"));
+        assert_eq!(found("# lines x to y\n5,6\n"), "5,6");
         // Behind a place a comment is none.
         assert_eq!(found("5,6\n# row,column\n"), "5,6");
     }
