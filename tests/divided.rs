@@ -392,40 +392,6 @@ fn taps_raise_false_alarms_at_the_stated_rate() {
     }
 }
 
-/// Amplifiers that do not differ are one: sums in another order, and lines one by one in place of their number.
-#[test]
-fn taps_over_flats_that_are_alike_are_one() {
-    for (seed, layout, count) in
-        [(1, TapLayout::Columns, 3), (2, TapLayout::TopBottom, 2), (4, TapLayout::Quadrants, 4)]
-    {
-        let alike = |chance: &mut Chance, readout: &mut ReadOut| {
-            drifting(chance, readout);
-            let read_noise_e = vec![readout.read_noise_e; count];
-            readout.taps = Some(Taps { layout, gain: vec![1.0; count], offset_e: vec![], read_noise_e });
-            (readout.width, readout.height) = (26, 20);
-        };
-        let whole = plane(&bench(seed, [26, 20], true, alike).frame());
-        for frame in [demosaicked(&whole, Method::Malvar), whole] {
-            let mut one = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-            one.header.metadata.sensor.as_mut().unwrap().readout.as_mut().unwrap().taps = None;
-            for part in [Region { x: 0, y: 0, width: 26, height: 20 }, Region { x: 3, y: 5, width: 19, height: 9 }] {
-                let of = |frame: &MemoryFrame| -> Vec<f64> {
-                    let mut source = MemoryFrame::new(frame.header.clone(), frame.samples.clone());
-                    let report = measure(&mut source, &[part], Saturated::Kept, Equations::Exact, Some(0.5)).unwrap();
-                    let region = &report.regions[0];
-                    let all = region.channels.iter().chain(&region.classes);
-                    all.flat_map(|channel| [channel.predicted_mean, channel.z_mean, channel.z_std].map(Option::unwrap))
-                        .collect()
-                };
-                for (found, expected) in of(&frame).into_iter().zip(of(&one)) {
-                    let off = (found - expected).abs();
-                    assert!(off < 1e-6 * (1.0 + expected.abs()), "{layout:?} {part:?}: {found} {expected}");
-                }
-            }
-        }
-    }
-}
-
 #[test]
 fn gains_of_rows_and_columns_are_predicted() {
     check(8, [120, 100], gained_lines);
