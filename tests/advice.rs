@@ -180,7 +180,7 @@ const ORDER: &[Advice] = &[
     ),
     advice(
         "color-difference srgb.tiff xyz.exr",
-        "run `to-xyz --space lab` instead",
+        "compare the frames that it was made of, behind `to-xyz --space lab`",
         &["to-xyz rgb.exr --matrix matrix.yaml --space lab -o x.exr", "color-difference x.exr xyz.exr"],
     ),
     advice("measure --patches noisy.exr", "give --patches=WxH", &["measure --patches=4x3 noisy.exr"]),

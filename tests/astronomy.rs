@@ -136,7 +136,7 @@ fn samples_heaped_at_the_top_are_told_where_nothing_else_tells_them() {
     fs::remove_file(shop.path("rgb.tiff.yaml")).unwrap();
     let said = shop.said("measure rgb.tiff", 0);
     assert!(
-        said.contains("at the largest value, 7500") && said.contains("nothing marks which pixels used them"),
+        said.contains("at the largest value, 7500") && said.contains("the white level that was known marks none"),
         "{said}"
     );
     // What a level marks is told by that.

@@ -2,10 +2,10 @@
 //! may be off by together.
 
 use super::super::scatter::Drift;
+use super::moved::{Moved, Nudge};
 use super::{Curve, Datum, Point4, Values};
 use crate::numerics::variance_components::Interval;
 use crate::text::in_digits;
-use std::sync::OnceLock;
 
 /// A black level that drifts by so many codes over all frames is told of.
 const MUCH_DRIFT: f64 = 0.1;
@@ -19,35 +19,6 @@ fn drifting(drift: f64) -> String {
     )
 }
 
-/// What [`Curve::moved`] found, once it was asked for. A copy of a curve begins anew: its numbers may be changed.
-#[derive(Debug, Default)]
-pub(super) struct Remembered(OnceLock<Option<Moved>>);
-
-impl Clone for Remembered {
-    fn clone(&self) -> Self {
-        Self::default()
-    }
-}
-
-/// The values of a curve, and where numbers that were measured are less and more, each by a step.
-#[derive(Debug)]
-struct Moved {
-    values: Values,
-    data: Vec<Nudge>,
-    /// All darks by what black may have drifted.
-    drift: Option<[Option<Values>; 2]>,
-    /// All numbers of photons by what they may be off by together.
-    photons: [Option<Values>; 2],
-}
-
-/// A number that was measured, and the values where it is a step less and more.
-#[derive(Debug)]
-struct Nudge {
-    datum: Datum,
-    step: f64,
-    ends: [Option<Values>; 2],
-}
-
 impl Curve {
     /// Takes in that means of darks drift so from frame to frame, over so many frames.
     pub(super) fn drift_over(&mut self, drift: Drift, frames: usize) {
@@ -59,23 +30,7 @@ impl Curve {
 
     /// The interval of a number that follows from the values, at such confidence; none where it does not follow.
     pub fn interval(&self, of: impl Fn(&Values) -> Option<f64>, confidence: f64) -> Option<Interval> {
-        let moved = self.moved.0.get_or_init(|| self.moved()).as_ref()?;
-        let value = of(&moved.values)?;
-        let slope = |ends: &[Option<Values>; 2]| {
-            let [below, above] = ends.map(|values| values.as_ref().and_then(&of).unwrap_or(value));
-            (above - below) / 2.0
-        };
-        let (mut variance, mut hidden) = (0.0, 0.0);
-        for Nudge { datum, step, ends } in &moved.data {
-            let slope = slope(ends);
-            variance += if datum.variance > 0.0 { slope.powi(2) } else { 0.0 };
-            hidden += (slope / step * datum.hidden).abs();
-        }
-        hidden += moved.drift.as_ref().map_or(0.0, |ends| slope(ends).abs());
-        variance += slope(&moved.photons).powi(2);
-        let Interval { low, high, .. } = Interval::normal(value, variance, confidence);
-        // What rounding hides of one level it may hide of all alike, and no chance makes it less.
-        Some(Interval { value, low: low - hidden, high: high + hidden })
+        self.moved.or_find(|| self.moved())?.interval(of, confidence)
     }
 
     /// The values where each number that was measured is moved; none where there are none.

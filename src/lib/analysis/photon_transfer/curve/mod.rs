@@ -12,14 +12,17 @@
 mod bend;
 mod ends;
 mod intervals;
+mod moved;
 mod point;
 mod response;
+mod values;
 mod weights;
 
 pub use ends::{
     LEAST_VARIANCE, are_whole, below_saturation, cut_off, first_cut, full_mean, hot_share, is_clipped, may_be_largest,
     stuck_shares, without_clipped, without_stuck,
 };
+pub use values::Values;
 pub use weights::{BEYOND_FIVE, relative_scatter};
 
 use super::fit::{Line, Point};
@@ -29,7 +32,7 @@ use super::scatter::{Component, Scatter};
 use super::settings::Settings;
 use crate::numerics::variance_components::Interval;
 use ends::peak;
-use intervals::Remembered;
+use moved::Remembered;
 use point::{Datum, Point4};
 
 /// The fits end at this share of saturation [EMVA1288, Sec. 6.5].
@@ -98,25 +101,6 @@ struct Weights {
     response: Vec<f64>,
     dark_mean: Vec<f64>,
     dark_variance: Vec<f64>,
-}
-
-/// What the levels of a class lead to, in the unit of the samples.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Values {
-    /// K, samples per electron.
-    pub gain: f64,
-    /// Temporal variance of no light, rounding included.
-    pub dark_variance: Option<f64>,
-    /// Mean of no light and no time, or of the shortest darks.
-    pub dark_mean: Option<f64>,
-    /// Mean of no light where the line through darks of two exposure times or more has it at no time.
-    pub black: Option<f64>,
-    /// R, samples per photon.
-    pub responsivity: Option<f64>,
-    /// Dark signal per second.
-    pub dark_slope: Option<f64>,
-    /// Dark variance per second.
-    pub dark_variance_slope: Option<f64>,
 }
 
 /// How many exposure times the darks have that the lines over time take.
