@@ -184,7 +184,7 @@ fn shown(finding: &Finding, Interval { value, low, high }: Interval) -> [String;
 /// What each number is, with its symbol's part of another where it has one.
 fn label(finding: &Finding) -> String {
     let part = finding.what.starts_with("of ");
-    let unit = in_brackets(&finding.unit);
+    let unit = in_brackets(finding.unit);
     if part { format!("  {}{unit}", finding.what) } else { format!("{}{unit}", finding.what) }
 }
 
