@@ -117,6 +117,11 @@ impl Law {
         0.5 * (angle * self.read_noise_e).powi(2) + self.light.damping(angle) + self.dark.damping(angle)
     }
 
+    /// The same, full photosites included, of which read noise alone hides anything.
+    pub fn least_damping(&self, angle: f64) -> f64 {
+        if self.reaches_full_well() { 0.5 * (angle * self.read_noise_e).powi(2) } else { self.damping(angle) }
+    }
+
     /// Whether full well, or sensitivities of zero, cut the charge off.
     pub fn is_cut(&self) -> bool {
         self.reaches_full_well() || self.is_rectified()

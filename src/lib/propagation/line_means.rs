@@ -161,7 +161,9 @@ impl LineMeans {
         let reading = adc.map_or_else(|| about.of_electrons(), |adc| about.of_codes(&adc, codes_of(&adc)));
         // What hides codes is what all have of their own, or what each kind has.
         let is_smooth = |law: &Law| {
-            let is_hidden = |adc: AdcRecord| adc.adu_per_e * blur_e >= STRAIGHT || law.counts_hide(&adc);
+            // Of full photosites no counts hide them.
+            let are_hidden_by_counts = |adc: &AdcRecord| !law.reaches_full_well() && law.counts_hide(adc);
+            let is_hidden = |adc: AdcRecord| adc.adu_per_e * blur_e >= STRAIGHT || are_hidden_by_counts(&adc);
             adc.is_none_or(|adc| adc.linearization.is_none() && is_hidden(adc))
         };
         let ends_e = adc.map_or([f64::NEG_INFINITY, f64::INFINITY], |adc| {

@@ -476,6 +476,18 @@ mod tests {
         let wanted = (row_noise_e.powi(2) / (row_noise_e.powi(2) + read_noise_e.powi(2))).asin() / TAU;
         let found = site.lines([8000.0; 3]).unwrap()[0].row[1];
         assert!((found - wanted).abs() < 1e-6, "{found} {wanted}");
+        // More of the edges, and light whose counts would hide them: m(z) = Σ Φ((s z − 10 j)/r).
+        for (read_noise_e, row_noise_e) in [(1.2, 1.0), (1.5, 1.0), (2.0, 1.0), (3.0, 2.0)] {
+            let of_row = |z: f64| -> f64 {
+                (-4..=4).map(|j| cumulative((row_noise_e * z - 10.0 * f64::from(j)) / read_noise_e)).sum()
+            };
+            let steps = (-400..=400).map(|step| 0.02 * f64::from(step));
+            let wanted: f64 = steps.map(|z| 0.02 * density(z) * (of_row(z) - 4.5).powi(2)).sum();
+            let lines = LineNoise { row_noise_e, ..LineNoise::default() };
+            let site = Photosite { model: NoiseModel { read_noise_e, lines, ..model }, ..site };
+            let found = site.lines([2600.0; 3]).unwrap()[0].row[1];
+            assert!((found / wanted - 1.0).abs() < 1e-5, "{read_noise_e} {row_noise_e}: {found} {wanted}");
+        }
     }
 
     /// Readings that jump by −a, 0 or a, a exponential of mean A, are off by nothing or, half of them, by a number of density

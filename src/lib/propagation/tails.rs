@@ -359,7 +359,7 @@ impl Photosite {
                 is_counted: false,
                 adu_per_e: adc.adu_per_e,
             };
-            ripples.add(&of, |angle| law.damping(angle));
+            ripples.add(&of, |angle| law.least_damping(angle));
         }
         nodes(&knees, &ripples, share, wanted)
     }
