@@ -230,7 +230,7 @@ fn layers_of_sigma_are_as_predicted() {
     };
     let changes: [fn(&mut Chance, &mut ReadOut); 3] = [tailed, noisy_lines, briefly];
     let mut told = 0;
-    for (seed, change) in (1..=4).flat_map(|seed| changes.map(|change| (seed, change))) {
+    for (seed, change) in (1..=2).flat_map(|seed| changes.map(|change| (seed, change))) {
         let plane = plane(&bench(seed, [60, 48], true, change).frame());
         for method in [Method::Bilinear, Method::Malvar] {
             let stage = Demosaic::new(&plane.header, method, Black::Auto, None).unwrap();
@@ -245,7 +245,7 @@ fn layers_of_sigma_are_as_predicted() {
             }
         }
     }
-    assert!(told >= 54, "{told}");
+    assert!(told >= 27, "{told}");
 }
 
 /// What is not predicted is refused by name.
@@ -346,7 +346,7 @@ fn sigma_of_drifts_covers() {
             let kit = Kit { flat_darks: darks.clone(), darks, flats, ..Kit::default() };
             demosaicked(&plane(&kit.correct(&camera.expose(electrons, exposure_s, temperature_k))), Method::Bilinear)
         };
-        let cameras = 600;
+        let cameras = 300;
         let all: Vec<MemoryFrame> = (1..=cameras).into_par_iter().map(made).collect();
         let noise = PixelNoise::of(&all[0].header).unwrap();
         let mut smallest = 1.0_f64;

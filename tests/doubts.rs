@@ -164,7 +164,7 @@ fn dark_frame(seed: u64) -> MemoryFrame {
 #[test]
 fn no_dark_frame_is_below_the_least_mean_of_its_metadata() {
     let (mut known, mut told, mut nearest) = (0, 0, f64::INFINITY);
-    for seed in 0..4000 {
+    for seed in 0..1600 {
         let frame = dark_frame(seed);
         let bounds = Bounds::of(&frame.header).unwrap();
         let count = frame.samples.len() as f64;
@@ -178,7 +178,7 @@ fn no_dark_frame_is_below_the_least_mean_of_its_metadata() {
         told += u32::from(mean / 2.0 < least);
     }
     // Noise above the largest code tells nothing, nor half of a bias of 0.
-    assert!(known > 2000 && told > 500 && nearest >= 0.0, "{known} {told} {nearest}");
+    assert!(known > 800 && told > 200 && nearest >= 0.0, "{known} {told} {nearest}");
 }
 
 /// Writes a frame again with other samples under its metadata.

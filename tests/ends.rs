@@ -251,7 +251,7 @@ impl Dice {
 #[test]
 fn random_cameras_are_predicted_as_sums_over_counts_have_it() {
     let mut dice = Dice(7);
-    for _ in 0..40 {
+    for _ in 0..20 {
         Reference::new(dice.case()).check(1e-6);
     }
 }

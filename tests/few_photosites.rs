@@ -110,7 +110,7 @@ fn tells_few(found: &ClassFindings, what: &str) -> bool {
 /// have none. That few make up what a number would differ by is said of a third and more that have 5, and of none that has none.
 #[test]
 fn numbers_are_those_of_the_photosites_there_are() {
-    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(24, |count| count.parse().unwrap());
+    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(16, |count| count.parse().unwrap());
     for (hot, jumping) in [(0.0, 0.0), (1.0, 0.0), (3.0, 0.0), (5.0, 0.0), (0.0, 1.0), (0.0, 3.0), (0.0, 5.0)] {
         let all: Vec<_> = (0..count)
             .into_par_iter()
@@ -142,7 +142,7 @@ fn numbers_are_those_of_the_photosites_there_are() {
 /// three in eight of those that jump did not, it is said that they are not in it.
 #[test]
 fn jumps_widen_the_noise_of_photosites() {
-    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(40, |count| count.parse().unwrap());
+    let count: u32 = std::env::var("CYANOMETER_CAMERAS").map_or(24, |count| count.parse().unwrap());
     let words = "photosites that jump, and did not between them";
     let held: Vec<Option<bool>> = (0..count)
         .into_par_iter()

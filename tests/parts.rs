@@ -334,3 +334,64 @@ fn photosites_without_light_have_their_code_for_good() {
         assert!((found - expected).abs() < 0.01 * expected + of_rounding, "{dark_e}: {found} {expected}");
     }
 }
+
+/// Jumps alone make a fixed pattern of what their rounding does to the mean of each photosite: by sums over amplitudes and codes. The causes
+/// add up.
+#[test]
+fn jumps_over_coarse_codes_are_a_fixed_pattern() {
+    for (bias_adu, read_noise_e, amplitude_e, share) in [(100.3, 2.0, 10.0, 0.1), (100.2, 1.5, 25.0, 0.02)] {
+        let codes = Codes { bits: 12, bias_adu, adu_per_e: 0.1, all_e2: read_noise_e * read_noise_e };
+        let setup = camera(|readout| {
+            (readout.bits, readout.bias_adu, readout.adu_per_e) = (12, bias_adu, codes.adu_per_e);
+            (readout.read_noise_e, readout.rts_share, readout.rts_amplitude_e) = (read_noise_e, share, amplitude_e);
+        });
+        let (mut temporal, mut mean, mut square) = (0.0, 0.0, 0.0);
+        let mut add = |weight: f64, jump_e: f64| {
+            let at = |off_e: f64| codes.read(bias_adu + codes.adu_per_e * off_e, codes.adu_per_e * read_noise_e);
+            let [down, still, up] = [at(-jump_e), at(0.0), at(jump_e)];
+            let [first, second] = [0, 1].map(|k| 0.25 * (down[k] + up[k]) + 0.5 * still[k]);
+            temporal += weight * (second - first * first);
+            mean += weight * (first - bias_adu);
+            square += weight * (first - bias_adu).powi(2);
+        };
+        add(1.0 - share, 0.0);
+        let step = 1e-3;
+        for index in 0..40_000 {
+            let t = (f64::from(index) + 0.5) * step;
+            add(share * step * (-t).exp(), amplitude_e * t);
+        }
+        let found = Predictor::new(PredictorSettings::of(setup)).unwrap().predict([0.0; 3]).unwrap();
+        let stage = stage(&found, ChainStage::Adu);
+        let [told, fixed] = [stage.temporal_std, stage.fixed_pattern_std].map(|std| std.unwrap()[0].powi(2));
+        let expected = square - mean * mean;
+        assert!((told / temporal - 1.0).abs() < 1e-6, "{bias_adu}: {told} {temporal}");
+        assert!(expected > 1e-5 && (fixed - expected).abs() < 1e-7, "{bias_adu}: {fixed} {expected}");
+        assert!(((told + fixed) / stage.std[0].powi(2) - 1.0).abs() < 1e-9);
+    }
+}
+
+/// Of a few hot photosites that are full nothing but read noise is drawn anew, whose rounding is no noise: beside sums over codes. Of those
+/// that are not full, one in 30 000, shot noise is.
+#[test]
+fn few_full_photosites_have_their_code_for_good() {
+    let (share, excess_e, full_well_e, adu_per_e) = (0.01, 1e8, 3000.5, 0.973);
+    for read_noise_e in [0.05, 0.15, 0.4] {
+        let codes = Codes { bits: 12, bias_adu: 100.3, adu_per_e, all_e2: read_noise_e * read_noise_e };
+        let setup = camera(|readout| {
+            (readout.bits, readout.bias_adu, readout.adu_per_e) = (12, codes.bias_adu, adu_per_e);
+            (readout.read_noise_e, readout.full_well_e) = (read_noise_e, full_well_e);
+            (readout.hot_pixel_share, readout.hot_pixel_dark_current_e_per_s) = (share, 10.0 * excess_e);
+        });
+        let variance = |level: f64| {
+            let [first, second] = codes.read(level, adu_per_e * read_noise_e);
+            second - first * first
+        };
+        let of_full = variance(codes.bias_adu + adu_per_e * full_well_e);
+        let of_filling = 0.5 * full_well_e.powi(2) / excess_e * adu_per_e * adu_per_e;
+        let expected = (1.0 - share) * variance(codes.bias_adu) + share * (of_full + of_filling);
+        let found = Predictor::new(PredictorSettings::of(setup)).unwrap().predict([0.0; 3]).unwrap();
+        let found = stage(&found, ChainStage::Adu).temporal_std.unwrap()[1].powi(2);
+        // What is drawn anew at those that fill is cut off by 1/60 of it.
+        assert!((found - expected).abs() < 0.03 * share * of_filling, "{read_noise_e}: {found} {expected}");
+    }
+}

@@ -1,8 +1,8 @@
 //! How often intervals miss the numbers that they are to hold, and how many trials are made.
 
-/// How many trials a law gets: a third of all, or all where CYANOMETER_CAMERAS asks for more of everything that is drawn at random.
+/// How many trials a law gets: a fourth of all, or all where CYANOMETER_CAMERAS asks for more of everything that is drawn at random.
 pub fn trials(all: u64) -> u64 {
-    if std::env::var_os("CYANOMETER_CAMERAS").is_some() { all } else { all / 3 }
+    if std::env::var_os("CYANOMETER_CAMERAS").is_some() { all } else { all / 4 }
 }
 
 /// The probability that an interval holds its number.

@@ -202,20 +202,26 @@ impl Photosite {
         if (whole - anew).is_nan() { f64::NAN } else { anew.clamp(0.0, whole) }
     }
 
-    /// Whether they show it where full well, or an end of the codes, cuts off more than next to none.
+    /// Whether they show it where full well, or an end of the codes, cuts off more than next to none; of few, where full well cuts off most,
+    /// as the shot noise of others hides it.
     fn ends(&self, adc: &AdcRecord, expected_e: f64) -> bool {
         const NEXT_TO_NONE: f64 = 1e-7;
-        if self.is_rare || self.model.tails.are_few {
+        const MOST: f64 = 0.5;
+        if self.is_rare {
             return false;
         }
         let law = Law::of(&self.model, expected_e);
-        let is_any_full = || law.reaches_full_well() && law.reaches(law.full_well_e) > NEXT_TO_NONE;
+        let are_full = |share: f64| law.reaches_full_well() && law.reaches(law.full_well_e) > share;
+        // Of full photosites nothing but read noise is drawn anew.
+        let shows_full = adc.adu_per_e * self.model.read_noise() < VISIBLE;
+        if self.model.tails.are_few {
+            return shows_full && are_full(MOST);
+        }
         if Dark::mean_of(self.model, 1).std_codes(adc, expected_e) >= VISIBLE_AT_ENDS {
-            // Of full photosites nothing but read noise is drawn anew.
-            return adc.adu_per_e * self.model.read_noise() < VISIBLE && is_any_full();
+            return shows_full && are_full(NEXT_TO_NONE);
         }
         let [lower, upper] = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
-        is_any_full()
+        are_full(NEXT_TO_NONE)
             || !law.is_within(adc)
                 && (law.is_read_from(upper) > NEXT_TO_NONE || law.is_read_from(lower) < 1.0 - NEXT_TO_NONE)
     }

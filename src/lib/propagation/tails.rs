@@ -461,7 +461,9 @@ impl Photosite {
         let Some(kinds) = effort::within(MOST_WORK, kinds) else { return [f64::NAN; Cause::ALL.len()] };
         let mut budget =
             Cause::ALL.map(|cause| kinds.iter().map(|kind| kind.weight * kind.value[cause as usize]).sum::<f64>());
-        budget[Cause::HotPixels as usize] += of_means;
+        let has_hot = self.models().any(|model| model.tails.has_hot());
+        // Of jumps alone means differ as their codes are rounded or end.
+        budget[if has_hot { Cause::HotPixels } else { Cause::ClippedPattern } as usize] += of_means;
         for kind in kinds.iter().filter(|kind| kind.is_free) {
             budget[Cause::Rts as usize] += kind.weight * jumps;
         }
