@@ -206,6 +206,77 @@ fn codes_of_little_noise_are_predicted() {
     check(1..=60, quiet);
 }
 
+/// A camera of 240 x 180 photosites that has such a dark signal in a second, and the frame of a second that is corrected by so many dark ones.
+fn less_darks(readout: ReadOut, light: [f64; 3], frames: usize, combine: Combine) -> MemoryFrame {
+    let temperature_k = readout.temperature_k;
+    let camera = Camera { readout, size: [240, 180], cfa: Some(CfaPattern::Rggb), seed: 77, frames: 0.into() };
+    let averaging = Averaging { combine, ..Default::default() };
+    let kit = Kit {
+        darks: camera.darks(frames, 1.0, temperature_k),
+        settings: DarkSettings { averaging, is_scaled: false },
+        ..Default::default()
+    };
+    kit.correct(&camera.expose(light, 1.0, temperature_k))
+}
+
+/// The mean and the spread of all classes are within 5 standard errors.
+fn is_as_predicted(what: &str, frame: &MemoryFrame) {
+    for class in classes(frame) {
+        let z = [class.z_mean.unwrap(), class.z_std.unwrap()];
+        assert!(z.iter().all(|z| z.abs() < 5.0), "{what}: {z:?} {class:?}");
+    }
+}
+
+/// Dark frames a part of whose samples is code 0: their medians are those of what is cut off, and clipped means are not told.
+#[test]
+fn medians_of_dark_frames_that_code_0_cuts_off_are_predicted() {
+    let readout = |bias_adu: f64| ReadOut {
+        full_well_e: 3800.0,
+        dark_current_na_per_cm2: None,
+        dark_current_e_per_s: Some(1.0),
+        dcnu: 0.1,
+        prnu: 0.01,
+        read_noise_e: 2.3,
+        bits: 12,
+        bias_adu,
+        adu_per_e: 1.0,
+        ..support::readout()
+    };
+    for (bias_adu, frames) in [(0.0, 8), (0.0, 7), (1.0, 8), (1.0, 3), (2.0, 7), (4.0, 8)] {
+        let corrected = less_darks(readout(bias_adu), [40.0, 60.0, 50.0], frames, Combine::Median);
+        is_as_predicted(&format!("median of {frames} above {bias_adu}"), &corrected);
+    }
+    let mut clipped = less_darks(readout(1.0), [40.0, 60.0, 50.0], 8, Combine::Clipped);
+    let report = measure(&mut clipped, &[], Saturated::LeftOut, Equations::Exact, None).unwrap();
+    let why = report.unpredicted.unwrap().to_string();
+    assert!(why.contains("an end of the codes cuts off the dark or bias frames"), "{why}");
+}
+
+/// A pattern of the dark current that goes over many codes, and knots of a table of codes: what dark frames leave of it is a small
+/// difference.
+#[test]
+fn tables_behind_wide_patterns_are_predicted() {
+    let codes = [0.0, 648.0, 1296.0, 1944.0, 2591.0, 3239.0, 3887.0];
+    let linear = [0.0, 622.36, 1289.77, 1916.01, 2588.58, 3218.16, 3888.41];
+    for (dark_e, dcnu) in [(5000.0, 0.26), (5000.0, 0.1), (3000.0, 0.26)] {
+        let readout = ReadOut {
+            full_well_e: 52_000.0,
+            dark_current_na_per_cm2: None,
+            dark_current_e_per_s: Some(dark_e),
+            dcnu,
+            prnu: 0.01,
+            read_noise_e: 15.0,
+            bits: 12,
+            bias_adu: 208.0,
+            adu_per_e: 0.0674,
+            linearization: Some(Linearization::table(codes.to_vec(), linear.to_vec()).unwrap()),
+            ..support::readout()
+        };
+        let corrected = less_darks(readout, [26_000.0, 18_000.0, 10_400.0], 4, Combine::Mean);
+        is_as_predicted(&format!("{dark_e} e- of {dcnu}"), &corrected);
+    }
+}
+
 #[test]
 fn flat_fields_may_keep_their_dark_signal() {
     check(1..=60, dark_flats);

@@ -5,7 +5,7 @@
 use crate::support;
 use cyanometer::camera::optics::Exposure;
 use std::fs;
-use support::dng::dng;
+use support::dng::{dng, dng_as_told};
 use support::workshop::{BAD_USAGE, Workshop, programs};
 
 /// What describes a frame, and what of a file is taken for it.
@@ -136,7 +136,7 @@ fn a_plane_behind_a_filter_array_is_found_by_its_name() {
         fs::remove_file(shop.path("several.exr.yaml")).ok();
         let line = "demosaic several.exr --cfa grbg --black 78 --white 4095 -o found.exr";
         let Some(found) = found else {
-            assert!(shop.said(line, BAD_USAGE).contains("which --channel NAME takes"), "{names:?}");
+            assert!(shop.said(line, BAD_USAGE).contains("take that with --channel NAME"), "{names:?}");
             continue;
         };
         let said = shop.said(line, 0);
@@ -220,7 +220,7 @@ fn a_channel_of_flats_is_measured_alone() {
     assert_eq!(gains(&one).into_iter().map(|(_, gain)| gain).collect::<Vec<_>>(), [green]);
     // What the complaint about an array of three planes advises can be done.
     let said = shop.attempt("photon-transfer three --cfa rggb", &[]);
-    assert!(String::from_utf8_lossy(&said.stderr).contains("which --channel NAME takes; leave out --cfa"));
+    assert!(String::from_utf8_lossy(&said.stderr).contains("take that with --channel NAME, or leave out --cfa"));
 }
 
 #[test]
@@ -297,4 +297,74 @@ fn black_is_said_by_site() {
     }
     let refused = String::from_utf8(shop.attempt(&format!("demosaic a.raw {line} --black 1,2,3 -o x.exr"), &[]).stderr);
     assert!(refused.unwrap().contains("give auto, none, a number, or four between commas"));
+}
+
+/// A black level that is said of a camera's frame counts in place of that of its tags, to the end: nothing is left of it, and white is as
+/// much lower. One of 0, which files without any have by DNG, contradicts nothing.
+#[test]
+fn a_black_level_that_is_said_counts_to_the_end() {
+    let shop = Workshop::new();
+    let strip: Vec<u8> = (0..120_u16).flat_map(|i| (700 + i % 7).to_le_bytes()).collect();
+    let white: (u16, &[u32]) = (50717, &[4000]);
+    fs::write(shop.path("none.dng"), dng_as_told([12, 10], &strip, &[white])).unwrap();
+    fs::write(shop.path("told.dng"), dng_as_told([12, 10], &strip, &[(50714, &[500]), white])).unwrap();
+    let levels = |name: &str| {
+        let metadata = shop.frame(name).header.metadata;
+        [metadata.uniform_black_adu().unwrap(), metadata.white_level_adu.unwrap().largest()]
+    };
+    assert_eq!(shop.said("import-raw none.dng --black 100 -o plane.tiff", 0), "");
+    assert_eq!(levels("plane.tiff"), [100.0, 4000.0]);
+    assert!(shop.said("import-raw told.dng --black 100 -o plane.tiff", BAD_USAGE).contains("the black level is 500"));
+    for file in ["none.dng", "told.dng"] {
+        for program in ["demosaic", "correct-frame"] {
+            let said = shop.said(&format!("{program} {file} --black 100 -o out.exr"), 0);
+            assert!(said.contains("--black auto takes; it counts in place of that"), "{said}");
+            assert!(!said.contains("it has no BlackLevel"), "{said}");
+            assert_eq!(levels("out.exr"), [0.0, 3900.0], "{program} {file}");
+            assert!((shop.frame("out.exr").samples[0] - 600.0).abs() < 10.0);
+        }
+    }
+    assert!(shop.said("demosaic none.dng -o out.exr", 0).contains("it has no BlackLevel, which by DNG is then 0"));
+}
+
+/// Planes without metadata: what dark frames take off, white is left above; defects are filled within a class where the array is told,
+/// and else that is said; planes of XYZ may be named so.
+#[test]
+fn plain_planes_keep_what_is_said_of_them() {
+    let shop = Workshop::new();
+    let raw = |name: &str, level: u16| {
+        let codes = (0..192_u16).flat_map(|i| (level + i % 5).to_le_bytes());
+        fs::write(shop.path(name), codes.collect::<Vec<u8>>()).unwrap();
+    };
+    [("light.raw", 3000), ("dark.raw", 500)].into_iter().for_each(|(name, level)| raw(name, level));
+    let line = "correct-frame light.raw --raw 16x12:u16le --white 4000 -o out.exr";
+    shop.said(&format!("{line} --cfa rggb --dark dark.raw"), 0);
+    let metadata = shop.frame("out.exr").header.metadata;
+    let white = metadata.white_level_adu.unwrap().largest();
+    assert!((white - (4000.0 - 501.99)).abs() < 0.01, "{white}");
+    assert_eq!(metadata.uniform_black_adu(), Some(0.0));
+    fs::write(shop.path("list.csv"), "3,4\n").unwrap();
+    let told = "nothing tells its filter array, and defects are filled from the photosites beside them";
+    assert!(shop.said(&format!("{line} --black 500 --defects list.csv"), 0).contains(told));
+    assert!(!shop.said(&format!("{line} --black 500 --defects list.csv --cfa monochrome"), 0).contains(told));
+}
+
+/// A frame of a camera that is larger than its sensor is one of another.
+#[test]
+fn frames_larger_than_their_sensor_are_told() {
+    let shop = Workshop::new();
+    let strip: Vec<u8> = (0..120_u16).flat_map(|i| (700 + i % 7).to_le_bytes()).collect();
+    fs::write(shop.path("a.dng"), dng_as_told([12, 10], &strip, &[(50714, &[500]), (50717, &[4000])])).unwrap();
+    for (size, is_told) in [([12, 10], false), ([12, 8], true), ([8, 10], true)] {
+        let readout = format!(
+            "width: {}, height: {}, cfa: rggb, full_well_e: 60000, dark_current_e_per_s: 0, temperature_k: 263, dcnu: 0, prnu: 0, \
+             read_noise_e: 5, bits: 12, bias_adu: 500, adu_per_e: 0.1",
+            size[0], size[1]
+        );
+        let sensor = format!("schema: cyanometer-sensor/2\nname: small\nreadout: {{{readout}}}\n");
+        fs::write(shop.path("s.yaml"), sensor).unwrap();
+        let said = shop.said("correct-frame a.dng --black auto --sensor s.yaml -o out.exr", 0);
+        let told = format!("up to column 11 and row 9, and its sensor `small` has {}x{} of them", size[0], size[1]);
+        assert_eq!(said.contains(&told), is_told, "{said}");
+    }
 }

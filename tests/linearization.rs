@@ -11,11 +11,10 @@ use cyanometer::frame::{Geometry, to_sample};
 use cyanometer::metadata::{FrameHeader, Metadata, Scene};
 use cyanometer::propagation::Equations;
 use cyanometer::stages::adc::{AdcSettings, Digitize};
-use cyanometer::stages::linearize::Linearize;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stream::MemoryFrame;
 use cyanometer::units::QuantityKind;
-use support::{sensor, through};
+use support::{sensor, straightened, through};
 
 /// Electrons of a uniform scene as a camera has them.
 fn electrons(readout: &ReadOut, electrons: [f64; 3], seed: u64) -> MemoryFrame {
@@ -33,12 +32,6 @@ fn electrons(readout: &ReadOut, electrons: [f64; 3], seed: u64) -> MemoryFrame {
 
 fn digitized(frame: &MemoryFrame) -> MemoryFrame {
     through(frame, &Digitize::new(&frame.header, &AdcSettings::default()).unwrap())
-}
-
-fn straightened(codes: &MemoryFrame) -> MemoryFrame {
-    let mut frame = codes.clone();
-    Linearize::of(&mut frame.header).unwrap().apply(&mut frame.samples);
-    frame
 }
 
 /// z scores of the mean and the spread of each plane.

@@ -96,7 +96,7 @@ fn masked_photosites_without_a_black_level_are_told() {
         [(50717, &[4000]), (50829, &[0, 4, 10, 12]), (50830, &[0, 0, 10, 4])];
     assert!(said("masked.dng", &[white, active, masked]).contains("it has masked photosites and no BlackLevel"));
     assert_eq!(said("told.dng", &[(50714, &[256]), white, active, masked]), "");
-    assert!(said("whole.dng", &[white]).contains("it has no BlackLevel, which by DNG is then 0; --metadata FILE"));
+    assert!(said("whole.dng", &[white]).contains("it has no BlackLevel, which by DNG is then 0; give the black level"));
 }
 
 /// Masks beside the active rows alone tell no row above them, and a rectangle leaves those out.

@@ -10,6 +10,7 @@ use crate::support::chain::{
 use crate::support::cmos::{
     SEEDS, before_demosaicking, regions, regions_cover, several_taps, sigma_covers, tapped, tapped_with_lines,
 };
+use crate::support::kit::{Camera, Chance, Kit, classes};
 use crate::support::misses::trials;
 use crate::support::{at, crop, sensor};
 use cyanometer::analysis::statistics::{Region, RegionReport};
@@ -429,4 +430,41 @@ fn sigma_knows_the_taps_of_each_photosite() {
         });
         sigma_covers(&format!("{taps:?} with lines"), &scene, &[Method::EffectiveColor], &places);
     }
+}
+
+/// Codes of amplifiers that bend, each made straight from its own bias and taken off dark frames, over a flat field or none: z scores of
+/// means and deviations are normal numbers, the rms of n of which is 1 within 4/√(2n).
+#[test]
+fn bent_amplifiers_are_made_straight_each_from_its_own_bias() {
+    let (mut square, mut count) = ([0.0; 2], 0.0);
+    for (index, taps) in several_taps().into_iter().enumerate() {
+        for seed in 0..trials(40) {
+            let mut chance = Chance(1000 * index as u64 + seed);
+            let size = [60, 48];
+            let mut readout = support::readout();
+            (readout.bits, readout.adu_per_e, readout.bias_adu, readout.full_well_e) = (14, 0.2, 900.0, 60_000.0);
+            (readout.dcnu, readout.prnu, readout.read_noise_e) = (0.05, 0.004, 8.0);
+            (readout.width, readout.height) = (60, 48);
+            let [bend, sway] = [(); 2].map(|()| chance.between(-0.05, 0.05) / 16_384.0);
+            readout.linearization = Some(Linearization::polynomial(vec![1.0, bend, sway / 16_384.0]).unwrap());
+            let offset_e = taps.offset_e.iter().map(|offset_e| 60.0 * offset_e).collect();
+            readout.taps = Some(Taps { offset_e, ..taps.clone() });
+            let cfa = Some(CfaPattern::ALL[chance.whole(0, 3)]);
+            let camera = Camera { readout, size, cfa, seed: 10_000 * index as u64 + 10 * seed, frames: 0.into() };
+            let darks = camera.darks(3, 0.02, 300.0);
+            let has_flats = seed % 2 == 0;
+            let flats = if has_flats { vec![camera.expose([16_000.0; 3], 0.02, 300.0); 1] } else { Vec::new() };
+            let flat_darks = if has_flats { darks.clone() } else { Vec::new() };
+            let kit = Kit { darks, flats, flat_darks, ..Kit::default() };
+            let light = [(); 3].map(|()| chance.between(2000.0, 40_000.0));
+            for class in classes(&kit.correct(&camera.expose(light, 0.02, 300.0))) {
+                let z = [class.z_mean.unwrap(), class.z_std.unwrap()];
+                assert!(z.iter().all(|z| z.abs() < 5.5), "{index} {seed}: {z:?} {class:?}");
+                square.iter_mut().zip(z).for_each(|(square, z)| *square += z * z);
+                count += 1.0;
+            }
+        }
+    }
+    let rms = square.map(|square: f64| (square / count).sqrt());
+    assert!(rms.iter().all(|rms| (rms - 1.0).abs() < 4.0 / (2.0_f64 * count).sqrt()), "{rms:?} of {count}");
 }

@@ -17,7 +17,6 @@ use cyanometer::stages::correct::{CorrectFrame, CorrectionSettings};
 use cyanometer::stages::darks::{DarkFrames, DarkSettings};
 use cyanometer::stages::defects::DefectMap;
 use cyanometer::stages::flats::FlatFrames;
-use cyanometer::stages::linearize::Linearize;
 use cyanometer::stages::noise::{AddNoise, NoiseSettings};
 use cyanometer::stages::saturation::with_mask;
 use cyanometer::stream::{MemoryFrame, Stage};
@@ -59,12 +58,8 @@ impl Camera {
             ..Default::default()
         };
         let noisy = through(&scene, &AddNoise::new(&scene.header, &settings).unwrap());
-        let mut codes = through(&noisy, &Digitize::new(&noisy.header, &AdcSettings::default()).unwrap());
-        if self.readout.linearization.is_some() {
-            let linearize = Linearize::of(&mut codes.header).unwrap();
-            linearize.apply(&mut codes.samples);
-        }
-        codes
+        let codes = through(&noisy, &Digitize::new(&noisy.header, &AdcSettings::default()).unwrap());
+        if self.readout.linearization.is_some() { super::straightened(&codes) } else { codes }
     }
 
     /// So many frames without light.

@@ -23,6 +23,7 @@ use cyanometer::error::Result;
 use cyanometer::formats::data::load_sensor;
 use cyanometer::frame::{Geometry, Rows, Window};
 use cyanometer::metadata::{FrameHeader, Metadata};
+use cyanometer::stages::linearize::Linearize;
 use cyanometer::stream::{Counts, MemoryFrame, RowSink, RowSource, Stage, run};
 use cyanometer::units::QuantityKind;
 use proptest::strategy::Strategy;
@@ -225,6 +226,15 @@ pub fn through_cuts<S: Stage>(input: &MemoryFrame, stage: &S, cuts: &[usize]) ->
 /// Drives a frame through a stage all at once.
 pub fn through<S: Stage>(input: &MemoryFrame, stage: &S) -> MemoryFrame {
     through_cuts(input, stage, &[]).0
+}
+
+/// Codes made straight, row after row.
+pub fn straightened(codes: &MemoryFrame) -> MemoryFrame {
+    let mut frame = codes.clone();
+    let linearize = Linearize::of(&mut frame.header).unwrap();
+    let rows = frame.samples.chunks_exact_mut(codes.header.geometry.row_samples());
+    rows.enumerate().for_each(|(y, row)| linearize.apply(row, y));
+    frame
 }
 
 /// Checks a law on `cases` values, always the same ones, and shows the simplest that breaks it.

@@ -196,6 +196,14 @@ impl Linearization {
         self.0.at(x)
     }
 
+    /// Codes above the bias at which it is not smooth, in ascending order.
+    pub fn knots(self) -> &'static [f64] {
+        match self.0 {
+            Curve::Polynomial { .. } => &[],
+            Curve::Table { codes, .. } => codes,
+        }
+    }
+
     /// How many straight ADU one of the code makes at a code above the bias.
     pub fn slope(self, x: f64) -> f64 {
         self.0.slope(x)

@@ -71,6 +71,11 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>> {
     read_table(file, &name)
 }
 
+/// A digest of a small file; none of one that cannot be read.
+pub fn digest_of(path: &Path) -> Option<String> {
+    read_file(path).ok().map(|bytes| format!("blake3:{}", blake3::hash(&bytes).to_hex()))
+}
+
 /// Reads what is small to its end, but no more than a table can be: a device may never end.
 ///
 /// # Errors

@@ -69,6 +69,11 @@ pub trait SampleReader: Send {
         None
     }
 
+    /// A doubt of a black level of 0 that the file does not tell, and its format takes for what is not told.
+    fn doubt_of_black(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Appends the next `rows` rows, laid out as `[row][channel][column]`; the values are those stored, integers not
     /// scaled. Rows beyond the last must not be asked for.
     ///

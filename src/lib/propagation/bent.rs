@@ -1,6 +1,7 @@
 //! Moments of the codes of a converter that is not straight, or of these made straight.
 
 use super::effort;
+use crate::camera::linearity::Linearization;
 use crate::metadata::AdcRecord;
 use crate::numerics::gauss::panel;
 use crate::numerics::normal::cumulative;
@@ -16,64 +17,137 @@ const STEP: f64 = 0.1;
 /// Moments 1 to 4 about `center` of the samples of a normal charge, in e⁻, that is read as codes between `ends`.
 ///
 /// Σ over the edges t between codes of \[g(t + ½) − g(t − ½)] T(t), with g the powers of a code's sample and T the probability
-/// of a charge beyond the edge. Many codes are an integral, less \[(D T)′]/24 − 7 \[(D T)‴]/5760 at its ends, by Euler and Maclaurin. Good to
-/// 3·10⁻⁷ of the charge's own moments.
+/// of a charge beyond the edge. Many codes are an integral, less \[(D T)′]/24 − 7 \[(D T)‴]/5760 at its ends, by Euler and Maclaurin, from one
+/// knot of a table to the next. Good to 3·10⁻⁷ of the charge's own moments.
 pub(super) fn moments(adc: &AdcRecord, ends: Rounding, mean_e: f64, std_e: f64, center: f64) -> [f64; 4] {
-    let powers = |code: f64| {
-        let x = adc.sample(code) - center;
-        [x, x * x, x * x * x, x * x * x * x]
-    };
     let code_of = |electrons: f64| ends.code(adc.level_at(electrons));
     if std_e <= 0.0 {
-        return powers(code_of(mean_e));
+        return powers(adc.sample(code_of(mean_e)) - center);
     }
     let reach = REACH * std_e;
     let (first, last) = (code_of(mean_e - reach), code_of(mean_e + reach));
-    let mut moments = powers(first);
-    let beyond = |edge: f64| cumulative((mean_e - adc.electrons_at(edge)) / std_e);
-    let mut add = |weight: f64, above: [f64; 4], below: [f64; 4]| {
-        for ((moment, above), below) in moments.iter_mut().zip(above).zip(below) {
+    let mut sum = Sum { moments: powers(adc.sample(first) - center), mean_e, std_e, center };
+    let sigma = (adc.level_at(mean_e + reach) - adc.level_at(mean_e - reach)) / (2.0 * REACH);
+    if last - first <= ONE_BY_ONE {
+        sum.one_by_one(adc, first, last);
+        return sum.moments;
+    }
+    let knots = adc.linearization.map_or(&[][..], Linearization::knots);
+    let mut code = first;
+    for knot in knots.iter().map(|knot| adc.bias_adu + knot).filter(|knot| *knot > first && *knot < last) {
+        // The knot lies between this code and the next, unless that was gone through.
+        let below = knot.floor();
+        if below >= code {
+            sum.run(adc, code, below, sigma);
+            sum.one_by_one(adc, below, below + 1.0);
+            code = below + 1.0;
+        }
+    }
+    sum.run(adc, code, last, sigma);
+    sum.moments
+}
+
+/// Powers 1 to 4.
+fn powers(x: f64) -> [f64; 4] {
+    [x, x * x, x * x * x, x * x * x * x]
+}
+
+/// Moments of a normal charge, so far.
+struct Sum {
+    moments: [f64; 4],
+    mean_e: f64,
+    std_e: f64,
+    center: f64,
+}
+
+/// What is linear between two knots, and so beyond them.
+struct Line {
+    code: f64,
+    sample: f64,
+    sample_slope: f64,
+    electrons: f64,
+    electrons_slope: f64,
+}
+
+impl Line {
+    /// That of a table at a code.
+    fn at(adc: &AdcRecord, code: f64) -> Self {
+        let slope = adc.linearization.map_or(1.0, |curve| curve.slope(code - adc.bias_adu));
+        Self {
+            code,
+            sample: adc.sample(code),
+            sample_slope: if adc.is_linearized { slope } else { 1.0 },
+            electrons: adc.electrons_at(code),
+            electrons_slope: slope / adc.adu_per_e,
+        }
+    }
+}
+
+impl Sum {
+    /// Takes in an edge at which charges of `electrons` are read as one sample or the other.
+    fn add(&mut self, weight: f64, electrons: f64, [below, above]: [f64; 2]) {
+        let weight = weight * cumulative((self.mean_e - electrons) / self.std_e);
+        let [below, above] = [below, above].map(|sample| powers(sample - self.center));
+        for ((moment, above), below) in self.moments.iter_mut().zip(above).zip(below) {
             *moment += weight * (above - below);
         }
-    };
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "codes, from 0 on")]
-    effort::spend((last - first).min(ONE_BY_ONE) as u64);
-    if last - first <= ONE_BY_ONE {
+    }
+
+    /// The edges from one code to another.
+    fn one_by_one(&mut self, adc: &AdcRecord, first: f64, last: f64) {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "codes, from 0 on")]
+        effort::spend((last - first).max(0.0) as u64);
         let mut code = first;
         while code < last {
-            add(beyond(code + 0.5), powers(code + 1.0), powers(code));
+            let samples = [code, code + 1.0].map(|code| adc.sample(code));
+            self.add(1.0, adc.electrons_at(code + 0.5), samples);
             code += 1.0;
         }
-        return moments;
     }
-    let sigma = (adc.level_at(mean_e + reach) - adc.level_at(mean_e - reach)) / (2.0 * REACH);
-    let panels = ((last - first) / (WIDEST * sigma)).ceil();
-    let width = (last - first) / panels;
-    let mut index = 0.0;
-    while index < panels {
-        for (edge, weight) in panel(first + index * width, first + (index + 1.0) * width) {
-            add(weight * beyond(edge), powers(edge + 0.5), powers(edge - 0.5));
+
+    /// The same where no knot lies between the codes, over each of which `sigma` are a standard deviation.
+    fn run(&mut self, adc: &AdcRecord, first: f64, last: f64, sigma: f64) {
+        if last - first <= ONE_BY_ONE {
+            self.one_by_one(adc, first, last);
+            return;
         }
-        index += 1.0;
-    }
-    // First and third derivatives by differences.
-    let step = STEP * sigma;
-    let [first_factor, third_factor] = [1.0 / (24.0 * 12.0 * step), 7.0 / (5760.0 * 2.0 * step.powi(3))];
-    for (end, sign) in [(last, 1.0), (first, -1.0)] {
-        for (steps, of_first, of_third) in [(1.0, 8.0, -2.0), (2.0, -1.0, 1.0)] {
-            let factor = sign * (third_factor * of_third - first_factor * of_first);
-            for (edge, side) in [(end + steps * step, 1.0), (end - steps * step, -1.0)] {
-                add(side * factor * beyond(edge), powers(edge + 0.5), powers(edge - 0.5));
+        let is_table = adc.linearization.is_some_and(|curve| !curve.knots().is_empty());
+        let line = is_table.then(|| Line::at(adc, 0.5 * (first + last)));
+        let sample = |code: f64| match &line {
+            Some(line) => line.sample + line.sample_slope * (code - line.code),
+            None => adc.sample(code),
+        };
+        let electrons = |edge: f64| match &line {
+            Some(line) => line.electrons + line.electrons_slope * (edge - line.code),
+            None => adc.electrons_at(edge),
+        };
+        let mut add = |weight: f64, edge: f64| self.add(weight, electrons(edge), [edge - 0.5, edge + 0.5].map(sample));
+        let panels = ((last - first) / (WIDEST * sigma)).ceil();
+        let width = (last - first) / panels;
+        let mut index = 0.0;
+        while index < panels {
+            for (edge, weight) in panel(first + index * width, first + (index + 1.0) * width) {
+                add(weight, edge);
+            }
+            index += 1.0;
+        }
+        // First and third derivatives by differences.
+        let step = STEP * sigma;
+        let [first_factor, third_factor] = [1.0 / (24.0 * 12.0 * step), 7.0 / (5760.0 * 2.0 * step.powi(3))];
+        for (end, sign) in [(last, 1.0), (first, -1.0)] {
+            for (steps, of_first, of_third) in [(1.0, 8.0, -2.0), (2.0, -1.0, 1.0)] {
+                let factor = sign * (third_factor * of_third - first_factor * of_first);
+                for (edge, side) in [(end + steps * step, 1.0), (end - steps * step, -1.0)] {
+                    add(side * factor, edge);
+                }
             }
         }
     }
-    moments
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::linearity::Linearization;
     use crate::numerics::rounding::partial_moments;
 
     /// The probabilities of all codes one by one.
@@ -95,8 +169,15 @@ mod tests {
     /// Spreads of a tenth of a code to half the range, in the middle and at both ends.
     #[test]
     fn moments_are_those_of_the_codes_one_by_one() {
-        for curve in [vec![1.0, 4e-6], vec![1.05, -3e-6, 1e-10], vec![1.0]] {
-            let linearization = Some(Linearization::polynomial(curve).unwrap());
+        let polynomials = [vec![1.0, 4e-6], vec![1.05, -3e-6, 1e-10], vec![1.0]];
+        let knots = |codes: &[f64], linear: &[f64]| Linearization::table(codes.to_vec(), linear.to_vec()).unwrap();
+        let tables = [
+            knots(&[0.0, 648.0, 1296.0, 1944.0, 2591.0, 3239.0], &[0.0, 622.4, 1289.8, 1916.0, 2588.6, 3218.2]),
+            knots(&[-90.5, 700.2, 700.4, 701.3, 3995.0], &[-80.0, 710.0, 710.3, 710.9, 4100.0]),
+        ];
+        let curves = polynomials.map(|curve| Linearization::polynomial(curve).unwrap());
+        for curve in curves.into_iter().chain(tables) {
+            let linearization = Some(curve);
             for is_linearized in [false, true] {
                 let adc = AdcRecord { linearization, is_linearized, ..AdcRecord::new(12, 100.0, 0.25) };
                 let ends = Rounding { lowest: 0.0, highest: 4095.0 };

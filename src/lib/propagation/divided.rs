@@ -15,7 +15,7 @@ use crate::stages::noise::{LineNoise, NoiseModel};
 
 /// Why nothing is predicted of samples that were divided by a flat field.
 const NARROW: &str = "what was divided by a flat field, or the flat field, reaches full well or an end of the codes, or \
-                                 scatters over less than a code";
+                                 scatters over less than half a code";
 /// The same of a converter that is not straight.
 const BENT: &str = "it was divided by a flat field, and the curve of its converter (`linearization`) is in both: what it makes of the quotient is not \
                     predicted; correct it with `--linearize`";

@@ -10,6 +10,7 @@ use super::unpredictable::{Predicted, Unpredictable};
 use crate::camera::levels::BlackLevel;
 use crate::error::Error;
 use crate::metadata::{FrameHeader, NoiseRecord, PoissonKind};
+use crate::numerics::averages::Combine;
 use crate::numerics::normal::MeanVariance;
 use crate::stages::noise::NoiseModel;
 use crate::stages::transfer::{Transfer, uniform_share};
@@ -103,6 +104,10 @@ const UNLIKE_FLATS: &str = "the median or clipped mean of flats counts whose lig
 const CLIPPED_BY_CODE: &str = "the noise of the dark or bias frames, over few codes, makes what their clipped mean leaves out hang \
                                on where in a code their mean lies; use `--combine mean` or `median`";
 
+/// Why nothing is predicted of a clipped mean of codes that end.
+const CUT_OFF: &str = "an end of the codes cuts off the dark or bias frames, and no formula tells what their clipped mean keeps; use \
+                       `--combine mean` or `median`";
+
 /// Why nothing is predicted where those that stand out were taken away.
 const FOUND: &str = "hot pixels or random telegraph signals that stand out were found and left out (`--find-defects`), and of the others nothing is \
                      told; list defects from elsewhere (`--defects`)";
@@ -185,6 +190,11 @@ pub(super) fn corrected(frame: &FrameHeader, codes: Photosite) -> Predicted<Phot
     let mut averages = corrected.darks.iter().flatten();
     if averages.any(|dark| corrected.adc.is_some_and(|adc| dark.is_clipped_by_code(&adc, 0.0))) {
         return Err(Unpredictable::Beyond(CLIPPED_BY_CODE));
+    }
+    let is_cut = |dark: &Dark| corrected.adc.is_some_and(|adc| corrected.of_dark(dark).is_cut(&adc));
+    if corrected.darks.iter().flatten().any(|dark| dark.combine == Combine::Clipped && dark.frames > 2 && is_cut(dark))
+    {
+        return Err(Unpredictable::Beyond(CUT_OFF));
     }
     if let Some(flat) = &correction.flat {
         if flat.unlike_levels > 0.0 {

@@ -267,14 +267,25 @@ impl Photosite {
         if is_counted { self.model.dark_e * adc.adu_per_e.powi(3) } else { 0.0 }
     }
 
-    /// How many dark frames a median is of that scatters over less than a code, and its photosites over few.
+    /// How many dark frames a median is of that scatters over less than a code, and its photosites over few, or that an end of the codes cuts off.
     pub(super) fn visible_median(&self, dark: &Dark, adc: &AdcRecord) -> Option<u32> {
         let is_median = self.equations == Equations::Exact && dark.combine == Combine::Median && dark.frames > 2;
         // Few electrons are no normal law either.
         let variance = dark.std_codes(adc, 0.0).powi(2);
         let is_skewed = self.temporal_third(adc) > SKEW * variance.powf(1.5);
         let is_fine = || dark.std_codes(adc, 0.0) * dark.kept()[0].sqrt() < VISIBLE || is_skewed;
-        (is_median && is_fine() && adc.adu_per_e * self.dark_pattern().sqrt() < MANY_CODES).then_some(dark.frames)
+        let is_told = || is_fine() && adc.adu_per_e * self.dark_pattern().sqrt() < MANY_CODES;
+        (is_median && (is_told() || self.is_cut(adc))).then_some(dark.frames)
+    }
+
+    /// Whether an end of the codes cuts off more than next to none of its dark frames, so that their medians and clipped means are not those of
+    /// a normal law.
+    pub(super) fn is_cut(&self, adc: &AdcRecord) -> bool {
+        const NEXT_TO_NONE: f64 = 1e-5;
+        let law = Law::of(&self.model, 0.0);
+        let [lower, upper] = [0.5, f64::from(adc.top_code()) - 0.5].map(|edge| adc.electrons_at(edge));
+        !law.is_nearly_within(adc)
+            && (law.is_read_from(lower) < 1.0 - NEXT_TO_NONE || law.is_read_from(upper) > NEXT_TO_NONE)
     }
 
     /// Whether roundings of its codes and of those of dark frames have something in common: neither scatters over codes from

@@ -91,10 +91,10 @@ pub fn shares(frame: &FrameHeader) -> Option<[f64; 3]> {
 /// The same of a sensor that is read through several amplifiers, the lowest of whose full codes counts for all.
 fn shares_of_taps(frame: &FrameHeader, least_e: f64) -> Option<[f64; 3]> {
     let parts = taps::parts(frame);
-    let full_code = |adc: AdcRecord| adc.full_code(least_e);
+    let full_sample = |adc: AdcRecord| adc.sample(adc.full_code(least_e));
     let lowest = match (frame.metadata.adc, frame.taps()) {
         (Some(adc), Some(taps)) => {
-            (0..taps.count()).map(|tap| full_code(adc.of_tap(taps, tap))).fold(f64::INFINITY, f64::min)
+            (0..taps.count()).map(|tap| full_sample(adc.of_tap(taps, tap))).fold(f64::INFINITY, f64::min)
         }
         _ => f64::INFINITY,
     };
@@ -109,8 +109,17 @@ fn shares_of_taps(frame: &FrameHeader, least_e: f64) -> Option<[f64; 3]> {
     Some([0, 1, 2].map(|k| if counts[k] > 0.0 { sums[k] / counts[k] } else { 0.0 }))
 }
 
-/// The shares of samples that are read from a charge on, or reach a code.
-fn shares_from(frame: &FrameHeader, least_e: f64, code: f64) -> Option<[f64; 3]> {
+/// The lowest code whose sample is no less.
+fn code_of(adc: &AdcRecord, sample: f64) -> f64 {
+    const ROUNDED: f64 = 1e-6;
+    match adc.is_linearized {
+        true => (adc.level_at((sample - adc.bias_adu) / adc.adu_per_e) - ROUNDED).ceil(),
+        false => sample,
+    }
+}
+
+/// The shares of samples that are read from a charge on, or reach a sample.
+fn shares_from(frame: &FrameHeader, least_e: f64, sample: f64) -> Option<[f64; 3]> {
     // Which exposures of an average a full photosite was full in is not told.
     let Sites { photosite, expected_e, .. } =
         Sites::of(frame, Equations::Exact).ok().filter(|_| frame.metadata.average.is_none())?;
@@ -118,7 +127,7 @@ fn shares_from(frame: &FrameHeader, least_e: f64, code: f64) -> Option<[f64; 3]>
     let left = frame.metadata.noise.as_ref().and_then(|noise| noise.cte).map_or(1.0, uniform_share);
     let first_e = match (quantity_of_sites(frame), photosite.adc) {
         (QuantityKind::Electrons, _) => f64::from(to_sample(least_e)),
-        (QuantityKind::Adu, Some(adc)) => adc.electrons_at(adc.full_code(least_e).min(code) - 0.5),
+        (QuantityKind::Adu, Some(adc)) => adc.electrons_at(adc.full_code(least_e).min(code_of(&adc, sample)) - 0.5),
         _ => return None,
     } / left;
     let share = |expected_e: f64| {

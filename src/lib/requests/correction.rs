@@ -1,16 +1,19 @@
 //! Corrections of a frame of codes before demosaicking.
 
 use super::border::measure_black;
-use super::correction_doubts::{doubt_of_bytes, doubt_of_cut_off, doubt_of_limits, doubts_of_flats, said_of_levels};
+use super::correction_doubts::{
+    doubt_of_array, doubt_of_bytes, doubt_of_cut_off, doubt_of_limits, doubts_of_flats, said_of_levels,
+};
 use super::dark_levels::{DarkLevels, doubt_of_dark, doubt_of_one};
 use super::described::{Described, doubt_of_black};
 use super::independence::{Company, Role, check_contents, check_files};
 use super::notes::Note;
 use super::options::{Input, SensorChoice};
 use super::values::{self, BlackChoice};
+use super::white_above_darks::keep_white;
 use crate::camera::levels::BlackLevels;
 use crate::error::{Error, Result};
-use crate::formats::files::read_file;
+use crate::formats::files::{digest_of, read_file};
 use crate::formats::input::{FrameReader, InputOptions, Linearizing, OfCamera};
 use crate::formats::many::OneOfMany;
 use crate::formats::register::check_inputs;
@@ -361,6 +364,8 @@ impl Correction {
         }
         let settings = CorrectionSettings { black: self.black(frame), cte: self.cte };
         let mut stage = CorrectFrame::of(frame, &settings, darks.as_ref().map(DarkFrames::stack), is_more)?;
+        let off = self.dark.first().or(self.bias.first()).filter(|_| !self.scale_dark).map(PathBuf::as_path);
+        notes.extend(keep_white(stage.header_mut(), frame, off, input)?);
         let geometry = &frame.geometry;
         let samples = (geometry.row_samples() * geometry.height) as u64;
         let beyond = self.find_defects.map(|given| given.unwrap_or_else(|| beyond_chance(samples)));
@@ -388,6 +393,7 @@ impl Correction {
         let levels = DarkLevels::of(frame, darks.as_ref().map(DarkFrames::stack), on_trust.is_some());
         let levels_of_flats = flats.as_ref().map(|(flats, _)| DarkLevels::of_flats(frame, flats));
         let defects = self.defects_record(beyond, dark_limits.as_ref(), flats.is_some());
+        warnings.extend(defects.as_ref().and_then(|_| doubt_of_array(frame)));
         let shares_masters = company.shares_darks().unwrap_or_else(|| {
             let problem =
                 "some of the dark frames come off both frame and flats: predictions take their noise for independent";
@@ -442,11 +448,6 @@ impl Correction {
             .collect(),
         })
     }
-}
-
-/// A digest of a list or map of defects; none of one that cannot be read, which is told elsewhere.
-fn digest_of(path: &Path) -> Option<String> {
-    read_file(path).ok().map(|bytes| format!("blake3:{}", blake3::hash(&bytes).to_hex()))
 }
 
 impl OpenCorrection {

@@ -28,6 +28,18 @@ pub(super) fn doubt_of_limits(beyond: f64) -> Option<String> {
     })
 }
 
+/// A warning of a plane that tells no filter array, whose defects are filled.
+pub(super) fn doubt_of_array(frame: &FrameHeader) -> Option<String> {
+    let is_untold = frame.metadata.cfa.is_none() && frame.geometry.channels.len() == 1;
+    is_untold.then(|| {
+        format!(
+            "{}: nothing tells its filter array, and defects are filled from the photosites beside them, whatever their color; give --cfa \
+             (`monochrome` of a sensor without filters)",
+            frame.name
+        )
+    })
+}
+
 /// What is wrong with flats by which `frame` is divided.
 pub(super) fn doubts_of_flats<S: RowSource>(
     flats: &FlatFrames<S>,

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::formats::input::{FrameReader, InputOptions, OfCamera};
 use crate::formats::register;
 use crate::metadata::{CorrectionRecord, FrameHeader};
-use crate::stages::black::Black;
+use crate::stages::black::{Black, is_said};
 use crate::stream::RowSource;
 use crate::units::QuantityKind;
 use clap::Args;
@@ -126,11 +126,12 @@ impl Described {
             let option: &[_] = if self.cfa.is_some() { &["cfa"] } else { &["pattern"] };
             if frame.geometry.channels.len() != 1 {
                 let problem = format!(
-                    "{}: it holds {}; a filter array stands before one, which --channel NAME takes",
+                    "{}: it holds {}, and a filter array stands before one; take that with --channel NAME, or leave out --{}",
                     frame.name,
-                    frame.holds()
+                    frame.holds(),
+                    option[0]
                 );
-                return Err(Error::Usage(problem).leave_out(option));
+                return Err(Error::Usage(problem));
             }
             let known = frame.metadata.cfa.filter(|known| *known != cfa);
             agree(frame, "filter array", known.map(|known| known.to_string()), option)?;
@@ -231,10 +232,20 @@ impl SaidExposure {
 /// [`Error::Usage`] where the metadata say another.
 pub fn apply_black(frame: &mut FrameHeader, black: BlackLevel) -> Result<()> {
     let said = BlackLevels::of_sites(black, frame.geometry.origin);
-    let known = frame.black_levels()?.filter(|known| known.has_deltas() || known.sites() != said.sites());
+    let differs = |known: &BlackLevels| known.has_deltas() || known.sites() != said.sites();
+    let known = frame.black_levels()?.filter(|known| !is_no_level(frame, known) && differs(known));
     agree(frame, "black level", known.map(|known| in_words(&known.level().sites())), &["black"])?;
     frame.metadata.set_black_adu(Some(black));
     Ok(())
+}
+
+/// Whether a black level is the 0 of files that tell none, as by DNG, or of ones that tell it for want of another.
+fn is_no_level(frame: &FrameHeader, known: &BlackLevels) -> bool {
+    let metadata = &frame.metadata;
+    known.uniform() == Some(0.0)
+        && metadata.history.is_empty()
+        && metadata.correction.is_none()
+        && metadata.adc.is_none()
 }
 
 /// A filter array by the option `cfa`, or by `pattern`, which means the same.
@@ -318,9 +329,13 @@ fn other_black(frame: &FrameHeader, black: BlackLevel) -> Option<String> {
         BlackLevel::Uniform(level) => (low.floor()..=high.ceil()).contains(&level),
         BlackLevel::Sites(said) => levels.iter().zip(said).all(|(known, said)| (known - said).abs() < 1.0),
     };
+    let which = match is_said(Black::Level(black), frame) {
+        true => "it counts in place of that",
+        false => "what is left of that counts as black further on",
+    };
     (!is_near).then(|| {
         format!(
-            "{}: --black {} is not the black level of its metadata, {}, which --black auto takes",
+            "{}: --black {} is not the black level of its metadata, {}, which --black auto takes; {which}",
             frame.name,
             in_words(&black.sites()),
             in_words(&levels)
@@ -498,8 +513,7 @@ mod tests {
         let cfa = Described { cfa: Some("rggb".parse().unwrap()), ..Described::default() };
         assert_eq!(
             said(cfa, &mut three),
-            "in: it holds three planes of electrons; a filter array stands before one, which --channel NAME takes; leave \
-             out `cfa`"
+            "in: it holds three planes of electrons, and a filter array stands before one; take that with --channel NAME, or leave out --cfa"
         );
         let white = Described { white_level_adu: Some(1.0), ..Described::default() };
         let complaint = "in: it holds three planes of electrons, which have no level of codes; leave out ";

@@ -38,6 +38,7 @@ pub mod picture;
 pub mod prediction;
 pub mod sensor;
 pub mod values;
+mod white_above_darks;
 
 mod notes;
 mod other_sensor;

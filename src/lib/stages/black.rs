@@ -44,6 +44,12 @@ impl Black {
     }
 }
 
+/// Whether a number that a user gives is the black level of a frame of codes, whatever its metadata say: of a camera's, whose tags may be
+/// wrong. What a converter is known of that we simulated has a black level, and a number takes a part of it off.
+pub fn is_said(black: Black, frame: &FrameHeader) -> bool {
+    matches!(black, Black::Level(_)) && frame.metadata.adc.is_none()
+}
+
 /// Whether a program has subtracted all of the black level.
 fn is_off(frame: &FrameHeader) -> Result<bool> {
     let is_left = frame.black_levels()?.is_none_or(|black| black.uniform() != Some(0.0));

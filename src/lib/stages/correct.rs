@@ -8,7 +8,7 @@ use crate::cfa::FilterArray;
 use crate::error::{Error, Result};
 use crate::frame::{Rows, Window, to_sample};
 use crate::metadata::{CorrectionRecord, DefectsRecord, FlatRecord, FrameHeader, Metadata};
-use crate::stages::black::{Black, white_left};
+use crate::stages::black::{Black, is_said, white_left};
 use crate::stages::darks::{DarkStack, check_codes, check_setting};
 use crate::stages::saturation::FullLevels;
 use crate::stages::transfer::{Transfer, uniform_share};
@@ -104,7 +104,7 @@ impl CorrectFrame {
             Some(darks) if darks.is_bias() && bias.is_some() => bias.as_ref(),
             Some(_) => known_black.as_ref(),
         };
-        note_levels(&mut metadata, input, off, is_subtracted)?;
+        note_levels(&mut metadata, input, off, is_subtracted, is_said(black, input))?;
         if let Some(cte) = cte {
             restore_levels(&mut metadata, input, cte, bias_adu)?;
         }
@@ -167,12 +167,13 @@ fn restore_levels(metadata: &mut Metadata, input: &FrameHeader, cte: f64, bias_a
 }
 
 /// Notes what is left of black and white once `off`, where that is known, is subtracted; a frame of unknown black counts
-/// as black-free after a subtraction.
+/// as black-free after a subtraction, and so does one whose black level is said.
 fn note_levels(
     metadata: &mut Metadata,
     input: &FrameHeader,
     off: Option<&BlackLevels>,
     is_subtracted: bool,
+    is_said: bool,
 ) -> Result<()> {
     let pattern = input.metadata.cfa.and_then(FilterArray::bayer);
     let left = |white| off.map(|off| white_left(white, off, &input.geometry, pattern));
@@ -185,7 +186,7 @@ fn note_levels(
     });
     metadata.white_level_adu = full.or(metadata.white_level_adu).and_then(left);
     match (input.black_levels()?, off) {
-        (Some(known), Some(off)) if known == *off => metadata.set_black_adu(Some(0.0.into())),
+        (Some(known), Some(off)) if is_said || known == *off => metadata.set_black_adu(Some(0.0.into())),
         (Some(_), Some(off)) => {
             // Only a number that a user gives is not the black level, and it is the same everywhere.
             let number = off.uniform().unwrap_or_default();

@@ -109,7 +109,9 @@ impl FromXyz {
     /// [`Error::Usage`] for an impossible white or light, and a luminance of relative XYZ.
     pub fn new(input: &FrameHeader, settings: &XyzSettings) -> Result<Self> {
         let holds = input.holds();
-        if input.metadata.quantity != QuantityKind::Xyz || !input.leads_with_three_planes() {
+        // Other programs name the planes by what they hold.
+        let is_named = input.geometry.channels.iter().take(3).eq(["X", "Y", "Z"]);
+        if input.metadata.quantity != QuantityKind::Xyz || !(is_named || input.leads_with_three_planes()) {
             return Err(input.refuse(format!("it holds {holds}, not three planes of XYZ")));
         }
         let space = settings.space;

@@ -136,6 +136,9 @@ pub fn own_matrix(path: &Path, light_named: Option<([f64; 2], String)>, which: O
     let (file, name) = open_named(Some(path))?;
     let mut file = TiffFile::open(file, &name)?;
     let image = RawImage::find(&mut file)?;
+    if !has_matrix(&image) && !tags::DNG_VERSION.is_in(&image.first) {
+        return Err(Error::format(&name, "it is no DNG, whose tags tell a color matrix"));
+    }
     if image.is_monochrome {
         return Err(Error::format(&name, "it is monochrome, and has no colors"));
     }

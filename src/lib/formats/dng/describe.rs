@@ -68,9 +68,9 @@ pub(super) fn doubt_of_black(image: &RawImage, active: Rectangle) -> Option<&'st
     let is_masked = tags::MASKED_AREAS.is_in(directory) || active != Rectangle::whole(image.size);
     let doubt = if is_masked {
         "it has masked photosites and no BlackLevel, which by DNG is then 0; what they read comes off with `import-raw --crop full` and \
-         `correct-frame --black border`, and --metadata FILE with `black_level_adu` tells a level that is known"
+         `correct-frame --black border`; give a level that is known"
     } else {
-        "it has no BlackLevel, which by DNG is then 0; --metadata FILE with `black_level_adu` tells a level that is known"
+        "it has no BlackLevel, which by DNG is then 0; give the black level where it is known"
     };
     (!tags::BLACK_LEVEL.is_in(directory)).then_some(doubt)
 }

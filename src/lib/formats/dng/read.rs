@@ -56,6 +56,7 @@ pub struct DngReader {
     table: Option<Vec<f32>>,
     /// From which share of the range on, and from which sample, they may be far from linear.
     linear: Option<(f64, f64)>,
+    doubt_of_black: Option<&'static str>,
     area: Rectangle,
     geometry: Geometry,
     own_tags: Metadata,
@@ -100,9 +101,6 @@ impl DngReader {
         describe::note_area(&mut file, &image, active, area, &mut notes)?;
         let is_ours = description.as_deref().is_some_and(|text| text.starts_with(METADATA_BEGIN));
         let mut own_tags = describe::describe(&mut file, &image, on_sensor, &levels, is_ours, &mut notes)?;
-        if let Some(doubt) = describe::doubt_of_black(&image, active).filter(|_| !is_ours) {
-            register::doubt(format!("{name}: {doubt}"));
-        }
         let opcodes = Opcodes::of(&mut file, &image)?;
         notes.extend(opcodes.notes);
         let doubts = describe::doubt_of_place(&image).into_iter().chain(opcodes.doubts).chain(levels.doubt_of_black());
@@ -126,6 +124,7 @@ impl DngReader {
             file,
             storage,
             linear: levels.linear(),
+            doubt_of_black: describe::doubt_of_black(&image, active).filter(|_| !is_ours),
             table: levels.table,
             area,
             geometry,
@@ -297,6 +296,10 @@ impl SampleReader for DngReader {
 
     fn linear_limit(&self) -> Option<(f64, f64)> {
         self.linear
+    }
+
+    fn doubt_of_black(&self) -> Option<&'static str> {
+        self.doubt_of_black
     }
 
     fn read(&mut self, rows: usize, samples: &mut Vec<f32>) -> Result<()> {

@@ -455,6 +455,7 @@ impl RowSource for FrameReader {
             self.has_begun = true;
             let is_tagged = self.header.metadata.time_s() == self.reader.own_tags().time_s();
             self.checks.linear_limit = self.reader.linear_limit();
+            self.checks.doubt_of_black = self.reader.doubt_of_black();
             self.checks.begin(&self.header, self.mask.is_some(), self.linearize.is_none(), is_tagged);
             self.pass_over(self.corner[1], &mut buffer)?;
         }
@@ -487,8 +488,8 @@ impl RowSource for FrameReader {
         }
         self.checks.look(&samples[first..], &self.header)?;
         if let Some(linearize) = &self.linearize {
-            let row_samples = self.header.geometry.row_samples();
-            samples[first..].chunks_exact_mut(row_samples).for_each(|row| linearize.apply(&mut row[..kept * width]));
+            let rows = samples[first..].chunks_exact_mut(self.header.geometry.row_samples());
+            rows.zip(self.rows_read..).for_each(|(row, y)| linearize.apply(&mut row[..kept * width], y));
         }
         self.buffer = buffer;
         self.rows_read += rows;

@@ -360,7 +360,14 @@ fn bias_level(frame: &FrameHeader, warnings: &mut Vec<String>) -> Result<BlackLe
     let Some(level) = frame.black_levels()? else {
         let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
         let bias = readout.map(|readout| BlackLevels::uniform_at(readout.bias_adu));
-        return bias.ok_or_else(|| frame.missing("black_level_adu"));
+        return bias.ok_or_else(|| {
+            let problem = format!(
+                "{}: dark signals are scaled above the bias of the converter, and neither its metadata nor a sensor tell that, nor a \
+                 black level (`black_level_adu`)",
+                frame.name
+            );
+            Error::Usage(problem).give(&["bias", "sensor"])
+        });
     };
     warnings
         .push(format!("{}: its black level is taken for the bias, beside which dark signals are scaled", frame.name));

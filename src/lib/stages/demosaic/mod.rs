@@ -23,7 +23,7 @@ use crate::error::Result;
 use crate::frame::{Rows, Window, mirror, to_sample};
 use crate::metadata::{DemosaicRecord, FrameHeader};
 use crate::numerics::vectors::{self, Instructions};
-use crate::stages::black::{Black, black_left, white_left};
+use crate::stages::black::{Black, black_left, is_said, white_left};
 use crate::stream::{Counts, Footprint, Stage};
 use crate::units::{Any, QuantityKind};
 use rows::{Planes, Ring, masks, mend, strips};
@@ -80,7 +80,7 @@ impl Demosaic {
             Some(pattern) => pattern,
             None => input.bayer("demosaicked")?.ok_or_else(|| input.missing("cfa"))?,
         };
-        let black = black.levels(input)?;
+        let (is_said, black) = (is_said(black, input), black.levels(input)?);
         let quantity = match metadata.quantity {
             QuantityKind::Unspecified => QuantityKind::Adu,
             known => known,
@@ -110,7 +110,8 @@ impl Demosaic {
             QuantityKind::Adu => {
                 let full = |white| white_left(white, &black, &input.geometry, Some(cfa));
                 made.white_level_adu = made.white_level_adu.map(full);
-                made.set_black_adu(Some(left(input.black_levels()?.as_ref())?.into()));
+                let known = input.black_levels()?.filter(|_| !is_said);
+                made.set_black_adu(Some(left(known.as_ref())?.into()));
             }
             _ => {
                 let dark = metadata.dark_signal_e.map(BlackLevels::uniform_at);

@@ -160,8 +160,10 @@ impl ChartFit {
         let expected = Expected::new(&reference, self.reference_light, self.light()?, &observer)?;
         let patches = matched(&seen, &expected, &reference)?;
         for Turned { corners, seen: turned } in &turned {
-            let gain = residual(&patches) / residual(&matched(turned, &expected, &reference)?);
-            if gain > MUCH_BETTER {
+            let [as_it_is, turned] = [residual(&patches), residual(&matched(turned, &expected, &reference)?)];
+            let gain = as_it_is / turned;
+            // Where no matrix at all has the colors, no corner is the one that was missed.
+            if as_it_is.is_finite() && gain > MUCH_BETTER {
                 return Err(Error::Usage(format!(
                     "{}: --corners begin at another patch than dark skin: turned, the chart fits its colors {gain:.1} times \
                      better; give --corners {}",
