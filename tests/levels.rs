@@ -125,7 +125,8 @@ fn equal_sites_are_a_uniform_level() {
         assert_same(&made(&short), &made(&long), method.names()[0]);
         let level =
             |black| Demosaic::new(&long.header, method, black, None).unwrap().header().uniform_black_adu().unwrap();
-        assert_eq!([level(Black::None), level(Black::Level(2.34.into()))], [102.34, 102.34 - 2.34]);
+        // A level that is said of a camera's frame is its black level.
+        assert_eq!([level(Black::None), level(Black::Level(2.34.into()))], [102.34, 0.0]);
     }
 }
 
@@ -162,15 +163,18 @@ fn a_crop_loses_what_the_whole_loses() {
 #[test]
 fn levels_by_site_that_no_word_is_left_for_are_refused() {
     let codes = with_levels(plane(12, 8, CfaPattern::Rggb.into()));
-    for black in [Black::None, Black::Level(100.0.into())] {
-        let made = Demosaic::new(&codes.header, Method::Bilinear, black, None);
+    let mut simulated = codes.header.clone();
+    simulated.metadata.adc = Some(cyanometer::metadata::AdcRecord::new(12, 100.0, 0.1));
+    for (frame, black) in [(&codes.header, Black::None), (&simulated, Black::Level(100.0.into()))] {
+        let made = Demosaic::new(frame, Method::Bilinear, black, None);
         refused(made, "what is left of its black level differs among photosites, which three planes cannot tell");
     }
-    // Of a plane each site keeps its own.
-    let less = correct(&codes.header, Black::Level(100.0.into()), None).unwrap();
-    let left = less.header().metadata.black_level_adu.unwrap();
-    assert_eq!(left, BlackLevel::Sites(SITES.map(|level| level - 100.0)));
-    assert_eq!(less.header().metadata.black_by_row, codes.header.metadata.black_by_row);
+    // Of a plane each site keeps its own; of a camera's nothing is left of a level that is said.
+    let less = |frame| correct(frame, Black::Level(100.0.into()), None).unwrap().header().metadata.clone();
+    let left = less(&simulated);
+    assert_eq!(left.black_level_adu, Some(BlackLevel::Sites(SITES.map(|level| level - 100.0))));
+    assert_eq!(left.black_by_row, codes.header.metadata.black_by_row);
+    assert_eq!((less(&codes.header).black_level_adu, less(&codes.header).black_by_row), (Some(0.0.into()), Vec::new()));
     for black in [Black::None, Black::Level(100.0.into())] {
         let mut codes = codes.clone();
         codes.header.metadata.adc = Some(cyanometer::metadata::AdcRecord::new(12, 100.0, 0.1));

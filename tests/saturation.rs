@@ -380,3 +380,21 @@ fn the_full_well_of_a_sensor_marks_frames_of_cameras_and_their_flats() {
     let told = said(&format!("correct-frame light.raw {how} --white 4095 -o black.exr"));
     assert!(!told.contains("saturated"), "{told}");
 }
+
+/// TIFF has no marks: the pixels that a sidecar counts are no fewer in what is made of them.
+#[test]
+fn counts_of_saturated_pixels_outlive_a_file_without_marks() {
+    let shop = Workshop::new();
+    let codes = (0..192_u16).flat_map(|at| (if at == 100 { 4095_u16 } else { 900 + at % 7 }).to_le_bytes());
+    fs::write(shop.path("light.raw"), codes.collect::<Vec<u8>>()).unwrap();
+    let raw = "--raw 16x12:u16le --cfa rggb --black 100 --white 4095";
+    shop.said(&format!("demosaic light.raw {raw} -o rgb.tiff"), 0);
+    fs::write(shop.path("m.yaml"), "schema: cyanometer-matrix/1\nunit: relative XYZ per (white level - black level)\nxyz_from_camera: [[0.5, 0.3, 0.2], [0.2, 0.7, 0.1], [0.0, 0.1, 0.9]]\n").unwrap();
+    shop.said("to-xyz rgb.tiff --matrix m.yaml -o xyz.tiff", 0);
+    let counted = |name: &str| {
+        let sidecar = String::from_utf8(shop.bytes(name)).unwrap();
+        sidecar.lines().find_map(|line| line.trim().strip_prefix("saturated: ").map(str::to_owned)).unwrap()
+    };
+    assert!(counted("rgb.tiff.yaml").parse::<u32>().unwrap() > 8);
+    assert_eq!(counted("xyz.tiff.yaml"), counted("rgb.tiff.yaml"));
+}

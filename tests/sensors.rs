@@ -371,7 +371,7 @@ const COMPLAINTS: [(&str, &str); 20] = [
          add-noise: rates-plane.exr: its sensor has an X-Trans filter array; only Bayer arrays are given noise",
     ),
     (
-        "demosaic codes.exr --metadata ./sites.yaml --black 3",
+        "demosaic codes.exr --metadata ./sites.yaml --black none",
         "codes.exr: what is left of its black level differs among photosites, which three planes cannot tell; subtract it \
          with --black auto",
     ),

@@ -193,9 +193,13 @@ impl Session {
         reader.keep_mask();
         let no_darks: Option<&mut DarkFrames<FrameReader>> = None;
         let made = masking.header(stage);
-        let counts =
-            self.write(&made, output, |writer, progress| masking.run(stage, &mut reader, no_darks, writer, progress))?;
-        self.ended(reader, counts).map(drop)
+        let known = unmarked(&reader, stage.header());
+        let mut own = Counts::default();
+        let counts = self.write(&made, output, |writer, progress| {
+            own = masking.run(stage, &mut reader, no_darks, writer, progress)?;
+            Ok(Counts { saturated_pixels: own.saturated_pixels.max(known), ..own })
+        })?;
+        self.ended(reader, counts.map(|_| own)).map(drop)
     }
 
     /// Drives the rows that have become of a frame `read` without a layer of marks, of which so much was counted before, through a stage
@@ -392,4 +396,14 @@ fn place_of(options: &OutputOptions) -> String {
 fn of_any_frame(text: &str) -> String {
     let Some((before, behind)) = text.split_once(FRAME_OF) else { return text.to_owned() };
     format!("{before}{}", behind.trim_start_matches(|c: char| c.is_ascii_digit()))
+}
+
+/// How many pixels of a frame that becomes another of as many planes were made of saturated samples by its sidecar, where nothing marks
+/// which: they are no fewer there.
+fn unmarked(reader: &FrameReader, made: &FrameHeader) -> u64 {
+    let frame = reader.header();
+    let counted = frame.metadata.samples.as_ref().and_then(|samples| samples.saturated);
+    counted
+        .filter(|_| frame.leads_with_three_planes() && made.geometry.channels.len() >= 3 && !reader.has_mask())
+        .unwrap_or(0)
 }

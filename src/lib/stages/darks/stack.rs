@@ -361,12 +361,9 @@ fn bias_level(frame: &FrameHeader, warnings: &mut Vec<String>) -> Result<BlackLe
         let readout = frame.metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
         let bias = readout.map(|readout| BlackLevels::uniform_at(readout.bias_adu));
         return bias.ok_or_else(|| {
-            let problem = format!(
-                "{}: dark signals are scaled above the bias of the converter, and neither its metadata nor a sensor tell that, nor a \
-                 black level (`black_level_adu`)",
-                frame.name
-            );
-            Error::Usage(problem).give(&["bias", "sensor"])
+            let problem = "dark signals are scaled above the bias of the converter, and neither its metadata nor a sensor tell that, nor a \
+                           black level (`black_level_adu`)";
+            frame.refuse(problem).give(&["bias", "sensor"])
         });
     };
     warnings
