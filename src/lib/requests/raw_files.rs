@@ -79,7 +79,7 @@ impl RawFiles {
             RawCrop::Rectangle(crop) => (RawArea::Active, Some(crop)),
         };
         let (path, metadata) = (job.input.clone(), self.metadata.clone());
-        let options = InputOptions { path, metadata, crop, ..InputOptions::default() };
+        let options = InputOptions { path, metadata, crop, tells_top: true, ..InputOptions::default() };
         let mut reader = FrameReader::open_raw(&options, area, worker)?;
         self.described.apply(reader.header_mut())?;
         Ok(reader)
