@@ -111,6 +111,8 @@ impl Sum {
             self.one_by_one(adc, first, last);
             return;
         }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred")]
+        effort::spend(ONE_BY_ONE as u64);
         let is_table = adc.linearization.is_some_and(|curve| !curve.knots().is_empty());
         let line = is_table.then(|| Line::at(adc, 0.5 * (first + last)));
         let sample = |code: f64| match &line {
