@@ -78,6 +78,11 @@ impl AdcRecord {
         Self { adu_per_e, bias_adu: self.bias_adu + adu_per_e * taps.offset_e(tap), ..self }
     }
 
+    /// Those behind all amplifiers of a sensor; itself of one that has one.
+    pub fn of_taps(self, taps: Option<&Taps>) -> Vec<Self> {
+        taps.map_or_else(|| vec![self], |taps| (0..taps.count()).map(|tap| self.of_tap(taps, tap)).collect())
+    }
+
     /// Whether its samples are not proportional to charge.
     pub fn is_bent(&self) -> bool {
         self.linearization.is_some() && !self.is_linearized

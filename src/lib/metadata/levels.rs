@@ -45,8 +45,7 @@ impl Metadata {
     fn top_sample(&self, adc: AdcRecord) -> f64 {
         let code = f64::from(adc.top_code());
         let taps = self.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref()?.taps.as_ref());
-        let of_tap = |tap| taps.map_or(adc, |taps| adc.of_tap(taps, tap)).sample(code);
-        (0..taps.map_or(1, |taps| taps.count())).map(of_tap).fold(f64::NEG_INFINITY, f64::max)
+        adc.of_taps(taps).iter().map(|adc| adc.sample(code)).fold(f64::NEG_INFINITY, f64::max)
     }
 }
 

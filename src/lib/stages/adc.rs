@@ -118,11 +118,7 @@ impl Digitize {
                 .ok_or_else(|| needed("sensor.readout.adu_per_e"))?,
         };
         adc.check().map_err(Error::Usage)?;
-        let taps = input.taps();
-        let adcs: Vec<AdcRecord> = match taps {
-            None => vec![adc],
-            Some(taps) => (0..taps.count()).map(|tap| adc.of_tap(taps, tap)).collect(),
-        };
+        let adcs = adc.of_taps(input.taps());
         if let Some(curve) = adc.linearization {
             adcs.iter().try_for_each(|adc| curve.check_rises(adc.range())).map_err(Error::Usage)?;
         }

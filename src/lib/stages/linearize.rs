@@ -67,10 +67,7 @@ impl Linearize {
         };
         let all = AdcRecord { is_linearized: true, ..adc };
         let taps = Places::of(frame);
-        let adcs = match &taps {
-            None => vec![all],
-            Some(Places { taps, .. }) => (0..taps.count()).map(|tap| all.of_tap(taps, tap)).collect(),
-        };
+        let adcs = all.of_taps(frame.taps());
         adcs.iter().try_for_each(|adc| curve.check_rises(adc.range())).map_err(|problem| frame.refuse(problem))?;
         let metadata = &mut frame.metadata;
         if metadata.black_by_row.iter().chain(&metadata.black_by_column).any(|delta| *delta != 0.0) {

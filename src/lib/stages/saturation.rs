@@ -178,9 +178,8 @@ fn levels_of_codes(frame: &FrameHeader) -> Option<[f64; 3]> {
     let readout = metadata.sensor.as_ref().and_then(|sensor| sensor.readout.as_ref());
     let white = metadata.white_level_adu.map(WhiteLevel::classes);
     // Of several amplifiers the lowest counts.
-    let of_taps = |adc: AdcRecord, level: &dyn Fn(AdcRecord) -> f64| match frame.taps() {
-        None => level(adc),
-        Some(taps) => (0..taps.count()).map(|tap| level(adc.of_tap(taps, tap))).fold(f64::INFINITY, f64::min),
+    let of_taps = |adc: AdcRecord, level: &dyn Fn(AdcRecord) -> f64| {
+        adc.of_taps(frame.taps()).into_iter().map(level).fold(f64::INFINITY, f64::min)
     };
     let least_e = least_full_e(frame).unwrap_or(f64::INFINITY);
     if let Some(adc) = metadata.adc {
