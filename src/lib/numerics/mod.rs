@@ -3,6 +3,7 @@
 pub mod averages;
 pub mod cut_off;
 pub mod distribution;
+pub mod edges;
 pub mod gauss;
 pub mod largest;
 pub mod least_squares;

@@ -84,14 +84,14 @@ impl Ripples {
     /// The ends of panels: 12 nodes sum a ripple that changes by a factor e^(16 i), forth or down, to 10⁻⁹; none of too many.
     fn ends(&self) -> Option<Vec<f64>> {
         const WIDTH: f64 = 16.0;
+        // The fastest first; what has died away stays so.
+        let mut left = self.all.clone();
+        left.sort_by(|a, b| a.rate.total_cmp(&b.rate));
         let mut ends = Vec::new();
         let mut end = 0.0;
         while end < REACH {
-            let left = self.all.iter().filter(|ripple| ripple.left > ripple.decay * end);
-            let rate = left.map(|ripple| ripple.rate).fold(0.0, f64::max);
-            if rate == 0.0 {
-                break;
-            }
+            while left.pop_if(|fastest| fastest.left <= fastest.decay * end).is_some() {}
+            let Some(Ripple { rate, .. }) = left.last() else { break };
             if ends.len() * NODES > MOST_NODES {
                 return None;
             }

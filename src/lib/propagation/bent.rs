@@ -3,22 +3,14 @@
 use super::effort;
 use crate::camera::linearity::Linearization;
 use crate::metadata::AdcRecord;
-use crate::numerics::gauss::panel;
-use crate::numerics::normal::cumulative;
-use crate::numerics::rounding::{REACH, Rounding};
-
-/// Codes up to which they are gone through one by one.
-const ONE_BY_ONE: f64 = 400.0;
-/// Widest panel of an integral over codes, in standard deviations.
-const WIDEST: f64 = 1.5;
-/// Step of a derivative, in standard deviations.
-const STEP: f64 = 0.1;
+use crate::numerics::edges;
+use crate::numerics::normal::{cumulative, density};
+use crate::numerics::rounding::{REACH, Rounding, SMOOTH};
 
 /// Moments 1 to 4 about `center` of the samples of a normal charge, in e⁻, that is read as codes between `ends`.
 ///
 /// Σ over the edges t between codes of \[g(t + ½) − g(t − ½)] T(t), with g the powers of a code's sample and T the probability
-/// of a charge beyond the edge. Many codes are an integral, less \[(D T)′]/24 − 7 \[(D T)‴]/5760 at its ends, by Euler and Maclaurin, from one
-/// knot of a table to the next. Good to 3·10⁻⁷ of the charge's own moments.
+/// of a charge beyond the edge; of a wide law over fewer [places](edges::over), from one knot of a table to the next. Good to 3·10⁻⁷ of the charge's own moments.
 pub(super) fn moments(adc: &AdcRecord, ends: Rounding, mean_e: f64, std_e: f64, center: f64) -> [f64; 4] {
     let code_of = |electrons: f64| ends.code(adc.level_at(electrons));
     if std_e <= 0.0 {
@@ -26,12 +18,15 @@ pub(super) fn moments(adc: &AdcRecord, ends: Rounding, mean_e: f64, std_e: f64, 
     }
     let reach = REACH * std_e;
     let (first, last) = (code_of(mean_e - reach), code_of(mean_e + reach));
-    let mut sum = Sum { moments: powers(adc.sample(first) - center), mean_e, std_e, center };
-    let sigma = (adc.level_at(mean_e + reach) - adc.level_at(mean_e - reach)) / (2.0 * REACH);
-    if last - first <= ONE_BY_ONE {
-        sum.one_by_one(adc, first, last);
-        return sum.moments;
+    let levels = [mean_e - reach, mean_e + reach].map(|electrons| adc.level_at(electrons));
+    let sigma = (levels[1] - levels[0]) / (2.0 * REACH);
+    if first > ends.lowest
+        && last < ends.highest
+        && let Some(found) = smooth(adc, levels, [mean_e, std_e], center)
+    {
+        return found;
     }
+    let mut sum = Sum { moments: powers(adc.sample(first) - center), mean_e, std_e, center };
     let knots = adc.linearization.map_or(&[][..], Linearization::knots);
     let mut code = first;
     for knot in knots.iter().map(|knot| adc.bias_adu + knot).filter(|knot| *knot > first && *knot < last) {
@@ -45,6 +40,47 @@ pub(super) fn moments(adc: &AdcRecord, ends: Rounding, mean_e: f64, std_e: f64, 
     }
     sum.run(adc, code, last, sigma);
     sum.moments
+}
+
+/// The same of a charge that scatters over so many codes that rounding is a uniform error of theirs, none of which between two levels is an end,
+/// or a knot of a table; none of others.
+///
+/// Σ_k g(k) P(k) = ∫ E g(t + u) φ(z(t)) z′(t) dt, z(t) how far off the charge is which the level t is of, u uniform on ±½: a sum over levels, as
+/// exact as for any normal law (Poisson's summation).
+fn smooth(adc: &AdcRecord, levels: [f64; 2], [mean_e, std_e]: [f64; 2], center: f64) -> Option<[f64; 4]> {
+    const STEPS_TO_SIGMA: f64 = 1.5;
+    const MOST_BENT: f64 = 1.5;
+    let is_within = levels[0] >= 0.0 && levels[1] <= f64::from(adc.top_code());
+    let curve = adc.linearization.filter(|curve| is_within && curve.knots().is_empty())?;
+    let slope = |level: f64| curve.slope(level - adc.bias_adu) / (adc.adu_per_e * std_e);
+    let [low, high] = levels.map(slope);
+    let steepest = low.max(high).max(slope(f64::midpoint(levels[0], levels[1])));
+    if !(low.min(high) > 0.0 && steepest < MOST_BENT * low.min(high) && steepest * SMOOTH < 1.0) {
+        return None;
+    }
+    let steps = ((levels[1] - levels[0]) * steepest * STEPS_TO_SIGMA).ceil();
+    let step = (levels[1] - levels[0]) / steps;
+    let errors = [(-0.15_f64.sqrt(), 5.0 / 18.0), (0.0, 4.0 / 9.0), (0.15_f64.sqrt(), 5.0 / 18.0)];
+    let mut found = [0.0; 4];
+    let mut index = 0.0;
+    while index <= steps {
+        let level = levels[0] + index * step;
+        let weight = step * density((adc.electrons_at(level) - mean_e) / std_e) * slope(level);
+        for (error, share) in if adc.is_linearized { &errors[..] } else { &[(0.0, 1.0)] } {
+            for (moment, power) in found.iter_mut().zip(powers(adc.sample(level + error) - center)) {
+                *moment += weight * share * power;
+            }
+        }
+        index += 1.0;
+    }
+    if !adc.is_linearized {
+        let [first, second, ..] = found;
+        let uniform = [0.0, 1.0 / 12.0, 0.25 * first, 0.5 * second + 1.0 / 80.0];
+        found.iter_mut().zip(uniform).for_each(|(moment, of_error)| *moment += of_error);
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some dozens")]
+    effort::spend(steps as u64);
+    Some(found)
 }
 
 /// Powers 1 to 4.
@@ -107,12 +143,6 @@ impl Sum {
 
     /// The same where no knot lies between the codes, over each of which `sigma` are a standard deviation.
     fn run(&mut self, adc: &AdcRecord, first: f64, last: f64, sigma: f64) {
-        if last - first <= ONE_BY_ONE {
-            self.one_by_one(adc, first, last);
-            return;
-        }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred")]
-        effort::spend(ONE_BY_ONE as u64);
         let is_table = adc.linearization.is_some_and(|curve| !curve.knots().is_empty());
         let line = is_table.then(|| Line::at(adc, 0.5 * (first + last)));
         let sample = |code: f64| match &line {
@@ -123,27 +153,10 @@ impl Sum {
             Some(line) => line.electrons + line.electrons_slope * (edge - line.code),
             None => adc.electrons_at(edge),
         };
-        let mut add = |weight: f64, edge: f64| self.add(weight, electrons(edge), [edge - 0.5, edge + 0.5].map(sample));
-        let panels = ((last - first) / (WIDEST * sigma)).ceil();
-        let width = (last - first) / panels;
-        let mut index = 0.0;
-        while index < panels {
-            for (edge, weight) in panel(first + index * width, first + (index + 1.0) * width) {
-                add(weight, edge);
-            }
-            index += 1.0;
-        }
-        // First and third derivatives by differences.
-        let step = STEP * sigma;
-        let [first_factor, third_factor] = [1.0 / (24.0 * 12.0 * step), 7.0 / (5760.0 * 2.0 * step.powi(3))];
-        for (end, sign) in [(last, 1.0), (first, -1.0)] {
-            for (steps, of_first, of_third) in [(1.0, 8.0, -2.0), (2.0, -1.0, 1.0)] {
-                let factor = sign * (third_factor * of_third - first_factor * of_first);
-                for (edge, side) in [(end + steps * step, 1.0), (end - steps * step, -1.0)] {
-                    add(side * factor, edge);
-                }
-            }
-        }
+        let places = edges::over(first, last, sigma, |edge, weight| {
+            self.add(weight, electrons(edge), [edge - 0.5, edge + 0.5].map(sample));
+        });
+        effort::spend(places);
     }
 }
 

@@ -14,6 +14,7 @@ pub(super) use super::node::Law;
 use super::node::{MANY_WELLS, Node};
 use super::reading::{Asked, ENDLESS, Moments, Reading, codes_of};
 use super::rectified::{corrections, signed_nodes};
+use super::sharp_counts::is_sharp;
 use crate::frame::to_sample;
 use crate::metadata::AdcRecord;
 use crate::numerics::normal::NearlyNormal;
@@ -110,6 +111,27 @@ impl Law {
             }
         }
         false
+    }
+
+    /// Whether few counts, each a code or codes on from the last, show how these are rounded at next to all photosites as no less than a
+    /// normal law of so many codes would, however many codes they scatter over.
+    pub fn counts_show(&self, adc: &AdcRecord, std_codes: f64) -> bool {
+        const FEW: [f64; 2] = [250.0, 5000.0];
+        const MOST_TURNS: u32 = 64;
+        let noise_e = self.read_noise_e.max(1e-3);
+        let few = FEW[usize::from(is_sharp(adc, self.read_noise_e))];
+        if self.are_few || self.light.least_counts(noise_e) * self.dark.least_counts(noise_e) > few {
+            return false;
+        }
+        // Within three standard deviations of the sensitivity in place of nine.
+        let most = |charge: &Charge| Charge { pattern: charge.pattern / 3.0, ..*charge };
+        let law = Self { light: most(&self.light), dark: most(&self.dark), ..*self };
+        let hidden = 2.0 * (PI * std_codes).powi(2);
+        let shows = |turns: u32| {
+            let angle = TAU * adc.adu_per_e * f64::from(turns);
+            law.damping(angle) + f64::from(turns).ln() < hidden
+        };
+        (1..=MOST_TURNS).any(shows)
     }
 
     /// The least −ln |E e^(iθy)| of what any photosite reads, y in electrons, where nothing cuts it off.

@@ -72,11 +72,11 @@ impl<A: Print, B: Print, C: Print> Print for (A, B, C) {
     }
 }
 
-impl<Key: PartialEq, Answer: Copy> Known<Key, Answer> {
+impl<Key: PartialEq, Answer: Clone> Known<Key, Answer> {
     /// The answer to what was asked, where it is known.
     fn recall(&self, print: u64, key: &Key) -> Option<(Answer, u64)> {
         let (_, of, answer, took) = self.answers.get(*self.places.get(&print)?)?;
-        (of == key).then_some((*answer, *took))
+        (of == key).then(|| (answer.clone(), *took))
     }
 
     fn keep(&mut self, answer: (u64, Key, Answer, u64)) {
@@ -89,13 +89,17 @@ impl<Key: PartialEq, Answer: Copy> Known<Key, Answer> {
                 }
                 *oldest = answer;
             }
-            None => self.answers.push(answer),
+            None => {
+                // Answers are large: they shall not move.
+                self.answers.reserve_exact(if self.next == 0 { KEPT } else { 0 });
+                self.answers.push(answer);
+            }
         }
         self.next = (self.next + 1) % KEPT;
     }
 }
 
-impl<Key: PartialEq + Print, Answer: Copy> Memory<Key, Answer> {
+impl<Key: PartialEq + Print, Answer: Clone> Memory<Key, Answer> {
     pub const fn new() -> Self {
         let places = HashMap::with_hasher(BuildHasherDefault::new());
         Self(RefCell::new(Known { answers: Vec::new(), next: 0, places }))
@@ -115,7 +119,7 @@ impl<Key: PartialEq + Print, Answer: Copy> Memory<Key, Answer> {
         if effort::is_spent() {
             return answer;
         }
-        self.0.borrow_mut().keep((print, key, answer, took));
+        self.0.borrow_mut().keep((print, key, answer.clone(), took));
         answer
     }
 }

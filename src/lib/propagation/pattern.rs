@@ -341,7 +341,7 @@ impl<'a> Temporal<'a> {
         let reaches = |jump: &Jump| {
             let offset_e = jump.reading.offset_e;
             if !is_affordable {
-                let read = self.charge(x, y).plus(NearlyNormal::normal(0.0, noise_e.powi(2)));
+                let read = self.law.cumulants_at([x, y]).plus(NearlyNormal::normal(0.0, noise_e.powi(2)));
                 return jump.share * read.exceeds(level_e - offset_e);
             }
             // Ties go upward.
@@ -390,26 +390,10 @@ impl<'a> Temporal<'a> {
         Some(weight * reading.smooth_at(low)[0] + slope * (charge - weight * low))
     }
 
-    /// Cumulants of the charge.
-    fn charge(&self, x: f64, y: f64) -> NearlyNormal {
-        let of = |charge: &Charge, factor: f64| {
-            let shot = |kind| if charge.shot == Some(kind) { charge.rate } else { 0.0 };
-            let counted = shot(PoissonKind::Exact);
-            let variable = NearlyNormal {
-                mean: charge.rate,
-                variance: counted + shot(PoissonKind::Gaussian),
-                third: counted,
-                fourth: counted,
-            };
-            variable.scaled(factor)
-        };
-        of(&self.law.light, x).plus(of(&self.law.dark, y))
-    }
-
     fn edgeworth(&self, jump: &Jump, x: f64, y: f64) -> f64 {
         let Jump { reading, rounding_at_full, .. } = jump;
         effort::spend(4);
-        let charge = self.charge(x, y);
+        let charge = self.law.cumulants_at([x, y]);
         let full = self.law.full_well_e;
         let [lower, upper] = reading.rails_e();
         let noise = NearlyNormal::normal(0.0, self.law.read_noise_e.powi(2));

@@ -183,6 +183,7 @@ impl Photosite {
         };
         !self.is_rare
             && (most < VISIBLE
+                || !self.has_tails() && law.counts_show(adc, VISIBLE)
                 || are_apart(&law.light, (self.model, 0.0))
                 || are_apart(&law.dark, (NoiseModel { dark_e: 0.0, ..self.model }, expected_e)))
     }

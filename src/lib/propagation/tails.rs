@@ -10,10 +10,9 @@
 //! with w the weights of quadrature in t and s: Gauss and Laguerre's, exact for polynomials of degree 19, where nothing ends or
 //! shows how codes are rounded as far as e^(−40); else panels that narrow towards full well and the ends of the codes.
 
-use super::amplitudes::{Knee, REACH, Ripples, Rounded, Wanted, is_read_as_charge, nodes, telling};
+use super::amplitudes::{REACH, Wanted};
 use super::blur::blur_e;
 use super::budget::{Budget, Cause};
-use super::charge::charge;
 use super::effort;
 use super::law::Law;
 use super::line_means::Kinds;
@@ -21,6 +20,7 @@ use super::memory::Memory;
 use super::mixture::mixture;
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
+use super::tail_nodes::Nodes;
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::numerics::averages::Combine;
 use crate::numerics::gauss::laguerre;
@@ -203,7 +203,7 @@ impl Photosite {
             }
             let traps = match hot == 0.0 && wanted == Wanted::Moments {
                 true => self.trap_nodes(expected_e, Wanted::Moments).unwrap_or_default(),
-                false => FEW.clone(),
+                false => FEW.as_slice().into(),
             };
             let all: f64 = traps.iter().map(|(_, weight)| weight).sum();
             let mut foreseen = effort::Foreseen::of(traps.len());
@@ -278,90 +278,9 @@ impl Photosite {
     }
 
     /// The frames that a sample follows from: their noise, and the light in them.
-    fn frames(&self, expected_e: f64) -> impl Iterator<Item = (&NoiseModel, f64)> {
+    pub(super) fn frames(&self, expected_e: f64) -> impl Iterator<Item = (&NoiseModel, f64)> {
         let darks = self.darks.iter().flatten().map(|dark| (&dark.model, 0.0));
         std::iter::once((&self.model, expected_e)).chain(darks)
-    }
-
-    /// Charges at which what is read bends: full well, and the ends of the codes that it does not hide.
-    fn levels_e(&self) -> impl Iterator<Item = f64> {
-        let ends = self.adc.map(|adc| [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code)));
-        let full_e = self.model.full_well_e;
-        let most_e = full_e + 12.0 * self.model.added() + REACH * self.most(|tails| tails.rts_e);
-        let ends = ends.into_iter().flatten().filter(move |level| *level <= most_e);
-        std::iter::once(full_e).chain(ends).filter(|level| level.is_finite())
-    }
-
-    /// Amplitudes of hot photosites, as many as tell what is wanted.
-    fn hot_nodes(&self, expected_e: f64, wanted: Wanted) -> Option<Vec<(f64, f64)>> {
-        let mut knees: Vec<Knee> = Vec::new();
-        let mut ripples = Ripples::default();
-        let mut share = 0.0_f64;
-        for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_hot()) {
-            let hot_e = model.tails.hot_e;
-            let cold = charge(model, light_e);
-            knees.extend(self.levels_e().map(|level_e| {
-                let shot = if model.dark_shot { (level_e - cold.mean).max(1.0) } else { 0.0 };
-                let width = (cold.variance + shot + model.added().powi(2) + model.tails.rts_e.powi(2)).sqrt();
-                // Jumps bend it apart from the rest.
-                let reach = if model.tails.has_rts() { 24.0 } else { 9.0 };
-                Knee { at: (level_e - cold.mean) / hot_e, width: width / hot_e, reach }
-            }));
-            // So bright few are that it does not matter whether they are cut off.
-            let variance = cold.variance + model.added().powi(2);
-            let of_squares = model.tails.hot_share * hot_e * hot_e / variance;
-            let is_told = is_read_as_charge(self.adc, model.full_well_e, [cold.mean, variance]);
-            share = if is_told { share.max(of_squares).max(model.tails.hot_share) } else { f64::INFINITY };
-            let farthest = telling(of_squares);
-            knees.retain(|knee| knee.at - 3.0 * knee.width < farthest);
-            if let Some(adc) = self.adc.filter(|_| wanted == Wanted::Moments) {
-                let law = Law { trap_e: 0.0, ..Law::of(model, light_e) };
-                let of = Rounded {
-                    share: model.tails.hot_share,
-                    mean_e: hot_e,
-                    is_counted: model.dark_shot,
-                    adu_per_e: adc.adu_per_e,
-                };
-                ripples.add(&of, |angle| law.damping(angle));
-            }
-        }
-        nodes(&knees, &ripples, share, wanted)
-    }
-
-    /// Amplitudes of jumps, as many as tell what is wanted.
-    fn trap_nodes(&self, expected_e: f64, wanted: Wanted) -> Option<Vec<(f64, f64)>> {
-        let Some(adc) = self.adc else { return nodes(&[], &Ripples::default(), 0.0, wanted) };
-        let mut knees = Vec::new();
-        let mut ripples = Ripples::default();
-        let mut share = 0.0_f64;
-        for (model, light_e) in self.frames(expected_e).filter(|(model, _)| model.tails.has_rts()) {
-            let amplitude_e = model.tails.rts_e;
-            let cold = charge(model, light_e);
-            let mean_e = cold.mean.min(model.full_well_e);
-            let width = (cold.variance + model.added().powi(2)).sqrt();
-            let of_squares = model.tails.rts_share * (amplitude_e / width).powi(2);
-            let is_told = is_read_as_charge(self.adc, model.full_well_e, [cold.mean, width * width]);
-            share = if is_told { share.max(of_squares).max(model.tails.rts_share) } else { f64::INFINITY };
-            let ends = [0.0, f64::from(adc.top_code())].map(|code| adc.electrons_at(code));
-            knees.extend(ends.map(|end| Knee {
-                at: (end - mean_e).abs() / amplitude_e,
-                width: width / amplitude_e,
-                reach: 24.0,
-            }));
-            if wanted != Wanted::Moments {
-                continue;
-            }
-            let quiet = model.at(&State { hot: 0.0, trap: 0.0 });
-            let law = Law::of(&quiet, light_e);
-            let of = Rounded {
-                share: model.tails.rts_share,
-                mean_e: amplitude_e,
-                is_counted: false,
-                adu_per_e: adc.adu_per_e,
-            };
-            ripples.add(&of, |angle| law.least_damping(angle));
-        }
-        nodes(&knees, &ripples, share, wanted)
     }
 
     /// What photosites of a line differ in, each of what a part of their noise leaves; for sums over the rest.
@@ -373,10 +292,10 @@ impl Photosite {
             let site = self.at(&State { hot, trap: 0.0 });
             Law::of(&part(&if hot > 0.0 { site.if_few(hot_share) } else { site }.model), expected_e)
         };
-        let of_share = |nodes: Option<Vec<(f64, f64)>>, share: f64| -> Vec<(f64, f64)> {
+        let of_share = |nodes: Option<Nodes>, share: f64| -> Vec<(f64, f64)> {
             let nodes = nodes.filter(|_| share > 0.0).unwrap_or_default();
             let sum: f64 = nodes.iter().map(|(_, weight)| weight).sum();
-            nodes.into_iter().map(|(at, weight)| (share * weight / sum, at)).collect()
+            nodes.iter().map(|(at, weight)| (share * weight / sum, *at)).collect()
         };
         // Where what all have of their own does not hide codes, amplitudes show how these are rounded.
         let is_coarse =
