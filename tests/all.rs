@@ -38,6 +38,7 @@ mod mistakes;
 mod near_full_well;
 mod noise;
 mod nothing_lost;
+mod one_pair;
 mod over_frames;
 mod parts;
 mod photon_transfer;
