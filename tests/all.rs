@@ -60,6 +60,7 @@ mod statistics;
 mod support;
 mod tails;
 mod taps;
+mod taps_over_frames;
 mod telescopes;
 mod told;
 mod unlike;

@@ -75,6 +75,7 @@ mod straight;
 mod tails;
 pub mod tap_lines;
 pub mod tapped;
+mod tapped_anew;
 mod tapped_array;
 mod tapped_axis;
 mod tapped_bent;
