@@ -25,6 +25,11 @@ pub struct MeanSquare {
 }
 
 impl MeanSquare {
+    /// What it scatters by, a variance.
+    pub fn variance(&self) -> f64 {
+        if self.freedom > 0.0 { 2.0 * self.value * self.value / self.freedom } else { 0.0 }
+    }
+
     /// The same of `count` places whose fourth cumulant is such; of tails that are shorter than normal it is as it was.
     #[must_use]
     pub fn with_tails(self, cumulant: f64, count: f64) -> Self {
@@ -104,6 +109,28 @@ impl Interval {
         Self { value: f(self.value), low: f(self.low), high: f(self.high) }
     }
 
+    /// The interval of the quotient θ = a/b of this number and another, whose errors have such a correlation ρ: of the θ at which the interval of
+    /// a − θ b, √(δ_a² + θ² δ_b² − 2 ρ θ δ_a δ_b) to either side, ends at 0, with δ the distances of the ends of both numbers \[DonnerZou2012].
+    /// Of normal numbers that is the interval of Fieller. Of a divisor that is not told from 0 it is that of small errors.
+    #[must_use]
+    pub fn over(self, by: Self, correlation: f64) -> Self {
+        let (a, b) = (self.value, by.value);
+        if a < 0.0 {
+            let Self { value, low, high } = Self { value: -a, low: -self.high, high: -self.low }.over(by, -correlation);
+            return Self { value: -value, low: -high, high: -low };
+        }
+        let end = |of_a: f64, of_b: f64, sign: f64| {
+            let rest = b * b - of_b * of_b;
+            if by.low <= 0.0 || rest <= 0.0 {
+                let [own, other] = [of_a / b, a / b * of_b / b].map(f64::abs);
+                return a / b + sign * (own * own + other * other - 2.0 * correlation * own * other).max(0.0).sqrt();
+            }
+            let middle = a * b - correlation * of_a * of_b;
+            (middle + sign * (middle * middle - (a * a - of_a * of_a) * rest).max(0.0).sqrt()) / rest
+        };
+        Self { value: a / b, low: end(a - self.low, by.high - b, -1.0), high: end(self.high - a, b - by.low, 1.0) }
+    }
+
     /// The interval of the root of a variance, none of it below 0: of an estimate below 0 that of 0, which reaches as far up, as a variance
     /// that chance has below 0 is not known to be none.
     #[must_use]
@@ -160,6 +187,25 @@ mod tests {
         assert_eq!(below.root(), Interval { value: 0.0, low: 0.0, high: 1.0 });
         let above = Interval { value: 4.0, low: -1.0, high: 9.0 };
         assert_eq!(above.root(), Interval { value: 2.0, low: 0.0, high: 3.0 });
+    }
+
+    /// Of 10 ± 2 over 5 ± 1: 24 θ² − 100 θ + 96 = 0 at 1.5 and 8/3; of errors that are half alike 24 θ² − 98 θ + 96 = 0; of a divisor that is known the
+    /// ends over that.
+    #[test]
+    fn quotients_end_where_differences_are_none() {
+        let [a, b] = [Interval { value: 10.0, low: 8.0, high: 12.0 }, Interval { value: 5.0, low: 4.0, high: 6.0 }];
+        let apart = a.over(b, 0.0);
+        assert!((apart.low - 1.5).abs() < 1e-12 && (apart.high - 8.0 / 3.0).abs() < 1e-12, "{apart:?}");
+        let alike = a.over(b, 0.5);
+        let root = f64::sqrt(98.0 * 98.0 - 4.0 * 24.0 * 96.0);
+        assert!((alike.low - (98.0 - root) / 48.0).abs() < 1e-12, "{alike:?}");
+        assert!((alike.high - (98.0 + root) / 48.0).abs() < 1e-12, "{alike:?}");
+        let below = Interval { value: -10.0, low: -12.0, high: -8.0 }.over(b, 0.0);
+        assert!((below.low + 8.0 / 3.0).abs() < 1e-12 && (below.high + 1.5).abs() < 1e-12, "{below:?}");
+        let known = a.over(Interval { value: 5.0, low: 5.0, high: 5.0 }, 0.3);
+        assert!((known.low - 1.6).abs() < 1e-12 && (known.high - 2.4).abs() < 1e-12, "{known:?}");
+        let untold = a.over(Interval { value: 1.0, low: -1.0, high: 3.0 }, 0.0);
+        assert!((untold.high - 10.0 - f64::hypot(2.0, 20.0)).abs() < 1e-12, "{untold:?}");
     }
 
     /// The interval of a single mean square is that of χ²: of 10 degrees of freedom, 10/20.4831 to 10/3.24697 times it.

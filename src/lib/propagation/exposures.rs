@@ -1,14 +1,16 @@
 //! What is predicted of several exposures of one scene: of their means, and of what is drawn anew in each.
 
-use super::frame::{FramePrediction, Sites};
+use super::frame::{self, FramePrediction, Sites};
 use super::lines::Axis;
 use super::moments::{Equations, Prediction};
 use super::photosite::Photosite;
 use super::repeated::{is_linear, without_fixed};
+use super::tapped_anew::{self, Read};
 use super::tapped_flat;
+use super::unlike::Temporal;
 use super::unpredictable::{Predicted, Unpredictable};
 use crate::frame::Geometry;
-use crate::metadata::{AdcRecord, AverageRecord, FrameHeader};
+use crate::metadata::{AdcRecord, AverageRecord, ExposuresRecord, FrameHeader};
 use crate::numerics::averages::Combine;
 use crate::stages::noise::NoiseModel;
 
@@ -49,25 +51,48 @@ impl Repeated {
         if frame.taps().is_some() && tapped_flat::flat_of(frame).is_some() {
             return Err(Unpredictable::Beyond(tapped_flat::FLATTENED));
         }
-        let sites = Sites::of(frame, equations)?;
         if !is_linear(frame) {
+            // What is not known of a single exposure is said first.
+            if frame.taps().is_none() {
+                Sites::of(frame, equations)?;
+            }
             return Err(Unpredictable::Beyond(CURVED_APART));
         }
-        let temporal = sites.photosite.temporal_of(sites.expected_e)?;
         let mean = AverageRecord { frames, combine: Combine::Mean, clip: None };
+        if let Some((read, variances)) = tapped_anew::drawn_anew(frame, equations, frames)? {
+            let scatter = |Read { sites, temporal }: &Read| scatter_of(frame, sites, temporal, frames);
+            let scatter = read.iter().try_for_each(scatter);
+            let means = frame::of_frame(&averaged(frame, mean), equations)?;
+            return Ok(Self { means, variances, scatter });
+        }
+        let sites = Sites::of(frame, equations)?;
+        let temporal = sites.photosite.temporal_of(sites.expected_e)?;
         let of = |moments: [Prediction; 3]| Sites { moments, ..sites.clone() }.frame(frame);
-        let hang_on_lines = sites.photosite.hangs_on_lines(sites.expected_e, &frame.geometry, frames);
-        let has_tails = temporal.iter().any(|temporal| temporal.unlike.is_none());
         Ok(Self {
             means: of([0, 1, 2].map(|k| temporal[k].averaged(&sites.moments[k], &mean)))?,
-            variances: of(temporal.map(|temporal| temporal.of_variances(frames)))?,
-            scatter: match (has_tails, hang_on_lines) {
-                (true, _) => Err(Unpredictable::Beyond(UNLIKE)),
-                (_, true) => Err(Unpredictable::Beyond(BY_LINES)),
-                _ => Ok(()),
-            },
+            variances: of(temporal.each_ref().map(|temporal| temporal.of_variances(frames)))?,
+            scatter: scatter_of(frame, &sites, &temporal, frames),
         })
     }
+}
+
+/// The head of such an average of exposures as a frame is one of.
+fn averaged(frame: &FrameHeader, average: AverageRecord) -> FrameHeader {
+    let mut averaged = frame.clone();
+    let metadata = &mut averaged.metadata;
+    metadata.average = Some(ExposuresRecord::of(average, metadata.quantity, metadata.demosaic.is_some()));
+    averaged
+}
+
+/// Why how far statistics over so many frames scatter is not known, of photosites that one amplifier reads, where it is not.
+fn scatter_of(frame: &FrameHeader, sites: &Sites, temporal: &[Temporal; 3], frames: u32) -> Predicted<()> {
+    if temporal.iter().any(|temporal| temporal.unlike.is_none()) {
+        return Err(Unpredictable::Beyond(UNLIKE));
+    }
+    if sites.photosite.hangs_on_lines(sites.expected_e, &frame.geometry, frames) {
+        return Err(Unpredictable::Beyond(BY_LINES));
+    }
+    Ok(())
 }
 
 impl Photosite {

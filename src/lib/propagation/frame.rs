@@ -408,7 +408,8 @@ impl PixelMoments {
 }
 
 /// Why the paper says nothing of pixels of several amplifiers.
-const OF_ONE: &str = "the paper's sensor is read through one amplifier, and several (`taps`) have a part in its pixels";
+pub(super) const OF_ONE: &str =
+    "the paper's sensor is read through one amplifier, and several (`taps`) have a part in its pixels";
 
 /// Pixels of a frame that several amplifiers have a part in.
 fn tapped(frame: &FrameHeader, equations: Equations) -> Predicted<TappedPixels> {

@@ -78,6 +78,7 @@ mod tail_nodes;
 mod tails;
 pub mod tap_lines;
 pub mod tapped;
+mod tapped_anew;
 mod tapped_array;
 mod tapped_axis;
 mod tapped_bent;

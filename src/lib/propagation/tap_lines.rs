@@ -125,6 +125,27 @@ impl TapLines {
         Ok(Self { row, drift: None, column, together, bent: [None, None] })
     }
 
+    /// What of that is drawn anew in each exposure, which has such moments at photosites; none where they share nothing.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::of`].
+    pub(super) fn drawn_anew(sites: &[Lit], moments: &[[Prediction; 3]]) -> Predicted<Option<Self>> {
+        if !sites.iter().any(|(photosite, _)| photosite.has_lines()) {
+            return Ok(None);
+        }
+        let one = sites.iter().map(|(photosite, expected_e)| (photosite.one_exposure(), *expected_e));
+        let one: Vec<Lit> = one.collect();
+        let ([whole_row, whole_column], [row, column]) = (shared(&one)?, fixed(&one)?);
+        Ok(Some(Self {
+            row: whole_row - row,
+            drift: TapDrift::of(sites, moments, None)?,
+            column: whole_column - column,
+            together: vec![Matrix3::zeros(); sites.len()],
+            bent: [None, None],
+        }))
+    }
+
     /// The matrices of rows and of columns.
     pub fn axes(&self) -> [&DMatrix<f64>; 2] {
         [&self.row, &self.column]

@@ -409,6 +409,13 @@ pub(super) fn sites(
     Ok(Some(TappedSites { groups, lines: lines.map(Box::new), cells, level }))
 }
 
+/// Photosites of a frame of which each amplifier has such a group, in the order of [`parts`], that share such lines.
+pub(super) fn of_groups(frame: &FrameHeader, groups: Vec<Group>, lines: Option<TapLines>) -> Option<TappedSites> {
+    let (_, cells) = cells(frame)?;
+    let level = level(&groups);
+    Some(TappedSites { groups, lines: lines.map(Box::new), cells, level })
+}
+
 /// The covariance of what all samples of R, G and B are off together that several amplifiers have read, and that such a flat field divided, by
 /// `sites` of a frame that one amplifier reads.
 ///

@@ -107,9 +107,9 @@ pub fn doubling_temperature(
     Ok(Interval { value: 1.0 / slope.value, low: 1.0 / slope.high, high: 1.0 / slope.low })
 }
 
-/// The temporal variance of single photosites in the dark, rounding included: at no exposure time, as the line through darks of three
+/// The temporal variance in the dark, of single photosites or the whole, rounding included: at no exposure time, as the line through darks of three
 /// times or more has it, or else that of the shortest, with the shot noise of its dark charge.
-pub fn pixel_noise(darks: &[&Level], rounding: f64, confidence: f64) -> Interval {
+pub fn variance_of_darks(darks: &[&Level], part: Part, rounding: f64, confidence: f64) -> Interval {
     let time = |dark: &Level| dark.condition.exposure_s.unwrap_or(0.0);
     let hidden = |darks: &[&Level]| darks.iter().map(|dark| dark.hidden(rounding).variance).fold(0.0, f64::max);
     let with_hidden = |of: Interval, hidden: f64| Interval { low: of.low - hidden, high: of.high + hidden, ..of };
@@ -119,19 +119,19 @@ pub fn pixel_noise(darks: &[&Level], rounding: f64, confidence: f64) -> Interval
     let mut times: Vec<f64> = whole.iter().filter_map(|dark| dark.condition.exposure_s).collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
-    let of_line = noise_over_time(&whole, rounding, confidence).filter(|_| times.len() >= 3);
+    let of_line = noise_over_time(&whole, part, rounding, confidence).filter(|_| times.len() >= 3);
     if let Some((line, [of_offset, _])) = of_line {
         return with_hidden(Interval::normal(line.offset, of_offset, confidence), hidden(&whole));
     }
     let shortest = darks.iter().map(|dark| time(dark)).fold(f64::INFINITY, f64::min);
     let short: Vec<&Level> = darks.iter().copied().filter(|dark| time(dark) <= shortest).collect();
-    with_hidden(temporal(&short, Part::Pixel, confidence), hidden(&short))
+    with_hidden(temporal(&short, part, confidence), hidden(&short))
 }
 
-/// The line through temporal variances of single photosites of darks over time, as [`fitted`] has it. Where these scatter by far more than those of normal
+/// The line through such temporal variances of darks over time, as [`fitted`] has it. Where these scatter by far more than those of normal
 /// noise, as where few photosites jump, what each of them scatters by is itself chance, and one that is low by chance would count more: there each scatters
 /// as the line has it, and as all of them together do.
-fn noise_over_time(darks: &[&Level], rounding: f64, confidence: f64) -> Option<(Line, [f64; 2])> {
+fn noise_over_time(darks: &[&Level], part: Part, rounding: f64, confidence: f64) -> Option<(Line, [f64; 2])> {
     /// So many times what normal noise scatters by is far more: a variance.
     const FAR: f64 = 4.0;
     /// Relative variance of a variance of normal noise, times its freedom.
@@ -139,7 +139,7 @@ fn noise_over_time(darks: &[&Level], rounding: f64, confidence: f64) -> Option<(
     let relative = relative_scatter(darks.iter().map(|dark| (dark.freedom(), dark.variance, dark.variance_variance)));
     let of = |line: Option<Line>| {
         let point = |dark: &&Level| {
-            let (time, value) = (dark.condition.exposure_s?, temporal(&[*dark], Part::Pixel, confidence).value);
+            let (time, value) = (dark.condition.exposure_s?, temporal(&[*dark], part, confidence).value);
             let level = line.map_or(value, |line| line.at(time)).max(rounding).max(0.5 * value);
             let scatter = if relative > FAR * NORMAL {
                 relative / dark.freedom() * level * level

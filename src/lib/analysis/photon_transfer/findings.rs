@@ -1,19 +1,20 @@
 //! What the levels of a class tell of its camera, number by number, each with its interval or with what would tell it.
 
 use super::curve::{Curve, Values, below_saturation, first_cut, stuck_shares, without_clipped, without_stuck};
-use super::dark::{doubling_temperature, parted_pattern, pixel_noise};
+use super::dark::{doubling_temperature, parted_pattern};
+use super::dark_noise::DarkNoise;
 use super::doubts::{doubts, gain_in_doubt};
 use super::few::told_of_few;
 use super::level::{Level, is_same_time};
 use super::limit::Limit;
 use super::linearity::{Linearity, Response, linearity};
-use super::pattern::{Part, drift_of, fixed, of_light, temporal, with_hidden};
+use super::pattern::{Part, drift_of, fixed, of_light, with_hidden};
 use super::reasons::{DRIFT_OF_FEW_ROWS, LOST_DARK, NO_NOISE, Reasons, frames_of_noise, of_gain, time_of_noise};
 use super::rounding::{Steps, least_normal};
 use super::row_drift::RowDrift;
 use super::scatter::Scatter;
 use super::settings::Settings;
-use super::sheet::{ClassFindings, CurvePoint, DarkPoint, Found, finding, over};
+use super::sheet::{ClassFindings, CurvePoint, DarkPoint, Found, finding, over, over_correlated};
 use super::suspects::suspects;
 use super::unknown::without_gain;
 use crate::numerics::variance_components::Interval;
@@ -69,40 +70,60 @@ pub fn of_class(
     add("gain_adu_per_e", gain.clone());
     let responsivity = number(&|v| v.responsivity, no_photons());
     add("responsivity_adu_per_photon", responsivity.clone());
-    let efficiency = number(&|v| Some(v.responsivity? / v.gain), no_photons());
+    let efficiency = curve.over_gain(|v| v.responsivity, confidence).ok_or_else(no_photons);
     add("quantum_efficiency", efficiency.clone());
     add("black_level_adu", number(&|v| v.dark_mean, no_darks()));
+    let noise = DarkNoise::of(&curve, darks, rounding, confidence);
+    let of_darks = noise.variance(Part::Total);
     // Beneath the rounding, and where the line through the flats ends below none, nothing is left to tell.
     let variance_of = |of: &dyn Fn(&Values) -> Option<f64>| {
         number(of, reasons.of_noise())
             .and_then(|found| if found.high > 0.0 { Ok(found) } else { Err(reasons.of_noise()) })
     };
-    add("dark_noise_adu", variance_of(&|v| v.dark_variance).map(Interval::root));
-    let read_variance = |v: &Values| Some((v.dark_variance? - rounding) / (v.gain * v.gain));
-    add("dark_noise_e", variance_of(&read_variance).map(Interval::root));
-    let repeated: Vec<&Level> = darks.iter().filter(|dark| dark.frames >= 2).collect();
+    let all = of_darks.map_or_else(|| variance_of(&|v| v.dark_variance), Ok);
+    add("dark_noise_adu", all.map(Interval::root));
+    // In electrons, less so much of the variance in samples².
+    let all_but = |less: f64| match (of_darks, &gain) {
+        (Some(variance), Ok(gain)) => {
+            let left = variance.map(|variance| variance - less);
+            if left.high > 0.0 { Ok(noise.in_electrons(Part::Total, left, *gain)) } else { Err(reasons.of_noise()) }
+        }
+        _ => variance_of(&|v| Some((v.dark_variance? - less) / (v.gain * v.gain))).map(Interval::root),
+    };
+    add("dark_noise_e", all_but(rounding));
     let over_gain = |part: Found| -> Found {
         let root = part?.root();
         if root.high > 0.0 { Ok(over(root, gain.clone()?)) } else { Err(NO_NOISE.into()) }
     };
-    let quietest = repeated.iter().min_by(|a, b| a.variance.total_cmp(&b.variance));
-    let drift = drift_of(&repeated).zip(gain.as_ref().ok()).map(|(drift, gain)| drift.in_electrons(gain.value));
+    let drift = drift_of(noise.darks()).zip(gain.as_ref().ok()).map(|(drift, gain)| drift.in_electrons(gain.value));
     for (key, part) in [("row_noise_e", Part::Row), ("column_noise_e", Part::Column), ("pixel_noise_e", Part::Pixel)] {
-        let of_part = |quietest: &&Level| match part {
-            Part::Pixel => pixel_noise(&repeated, rounding, confidence).map(|variance| variance - rounding),
-            _ => with_hidden(temporal(&repeated, part, confidence), part, quietest, rounding),
-        };
-        let told = quietest.filter(|_| curve.tells_dark_noise()).map(of_part);
         let is_hidden = part == Part::Row && drift.is_some_and(|drift| drift.hides_rows());
+        let less = if part == Part::Pixel { rounding } else { 0.0 };
+        let told = noise.variance(part).map(|told| told.map(|variance| variance - less));
         let told = if is_hidden { Err(DRIFT_OF_FEW_ROWS.into()) } else { told.ok_or_else(|| reasons.of_noise()) };
-        add(key, over_gain(told));
+        add(
+            key,
+            told.and_then(|told| {
+                if told.root().high > 0.0 {
+                    Ok(noise.in_electrons(part, told, gain.clone()?))
+                } else {
+                    Err(NO_NOISE.into())
+                }
+            }),
+        );
     }
     // The signal that equals its noise: ½ + √(¼ + σ²) [EMVA1288, Eq. 25].
-    let noise_square = |v: &Values| Some(v.dark_variance? / (v.gain * v.gain));
-    let threshold = |square: f64| 0.5 + (0.25 + square.max(0.0)).sqrt();
-    let threshold_e = variance_of(&noise_square).map(|square| square.map(threshold));
+    let threshold = |noise_e: f64| 0.5 + (0.25 + noise_e * noise_e).sqrt();
+    let threshold_e = all_but(0.0).map(|noise_e| noise_e.map(threshold));
     add("threshold_e", threshold_e.clone());
-    add("threshold_photons", threshold_e.clone().and_then(|threshold| Ok(over(threshold, efficiency?))));
+    let alike = || {
+        let threshold = |v: &Values| Some(threshold(v.dark_variance?.max(0.0).sqrt() / v.gain));
+        curve.correlation(&threshold, &|v| Some(v.responsivity? / v.gain))
+    };
+    add(
+        "threshold_photons",
+        threshold_e.clone().and_then(|threshold| Ok(over_correlated(threshold, efficiency?, alike()))),
+    );
     let limit = Limit::of(&curve, flats, settings);
     let [saturation_e, saturation_photons, full_well] = limit.capacities(reasons, gain.clone(), confidence);
     add("saturation_e", saturation_e.clone());
@@ -138,10 +159,10 @@ pub fn of_class(
         }
         _ => current,
     };
-    let per_second = |v: &Values| Some(v.dark_slope? / v.gain);
+    let per_second = || curve.over_gain(|v| v.dark_slope, confidence).ok_or_else(|| reasons.of_times());
     // What darks took off the frames they do not show.
     let kept = |found: Found| if settings.lost_dark() { Err(LOST_DARK.into()) } else { found };
-    add("dark_current_e_per_s", kept(number(&per_second, reasons.of_times()).map(sampled)));
+    add("dark_current_e_per_s", kept(per_second().map(sampled)));
     let from_variance = |v: &Values| Some(v.dark_variance_slope? / (v.gain * v.gain));
     let why = if curve.is_silent { reasons.of_noise() } else { reasons.of_times() };
     add("dark_current_from_variance_e_per_s", number(&from_variance, why).map(sampled));
@@ -164,7 +185,7 @@ pub fn of_class(
     }
     let (curve_points, values) = (points.collect(), curve.values());
     let mut notes = notes(&curve, flats, lit.map(|(_, level)| level.frames), &limit);
-    notes.extend(told_of_few(&repeated.iter().map(|dark| (*dark).clone()).collect::<Vec<_>>()));
+    notes.extend(told_of_few(&noise.darks().iter().map(|dark| (*dark).clone()).collect::<Vec<_>>()));
     notes.extend(drift.map(|RowDrift { variance, .. }| {
         format!(
             "the black level drifts along rows, by {} e- rms: that is in temporal dark noise, and not in that of rows",

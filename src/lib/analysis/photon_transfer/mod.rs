@@ -5,6 +5,7 @@
 
 mod curve;
 mod dark;
+mod dark_noise;
 mod doubts;
 mod falling;
 mod few;

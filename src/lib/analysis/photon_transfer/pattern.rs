@@ -35,8 +35,9 @@ impl Part {
     }
 }
 
-/// The terms of a part of a variance that several grids share, each counted by its photosites.
-fn terms(
+/// The mean squares of rows, columns and what is left of all grids, each with its share in a part of a variance that the grids share, which
+/// are counted by their photosites.
+fn all_terms(
     level: &Level,
     part: Part,
     of: impl Fn(usize) -> (MeanSquares, [usize; 2]),
@@ -49,22 +50,35 @@ fn terms(
         let [rows, columns, rest] = part.shares(size).map(|share| share * factor * site.count() as f64 / count);
         terms.extend([(rows, squares.rows), (columns, squares.columns), (rest, squares.rest)]);
     }
+    terms
+}
+
+/// Those that have a share.
+fn terms(
+    level: &Level,
+    part: Part,
+    of: impl Fn(usize) -> (MeanSquares, [usize; 2]),
+    factor: f64,
+) -> Vec<(f64, MeanSquare)> {
+    let mut terms = all_terms(level, part, of, factor);
     terms.retain(|(share, _)| *share != 0.0);
     terms
+}
+
+/// A drift that is left in rows, so much of its variance, makes them alike, and fewer.
+fn fewer(squares: MeanSquares, drift: Option<RowDrift>, [columns, _]: [usize; 2], left: f64) -> MeanSquares {
+    let kept = drift.map_or(1.0, |drift| drift.kept_freedom(squares.rows.value / columns as f64, left));
+    MeanSquares { rows: MeanSquare { freedom: squares.rows.freedom * kept, ..squares.rows }, ..squares }
 }
 
 /// Terms of the fixed pattern of a level.
 fn fixed_terms(level: &Level, part: Part, factor: f64) -> Vec<(f64, MeanSquare)> {
     let drift = drift_of(&[level]);
-    // A drift that is left in rows makes them alike, and fewer.
-    let fewer = |squares: MeanSquares, index: usize, left: f64| {
-        let kept =
-            drift.map_or(1.0, |drift| drift.kept_freedom(squares.rows.value / size(level, index)[0] as f64, left));
-        MeanSquares { rows: MeanSquare { freedom: squares.rows.freedom * kept, ..squares.rows }, ..squares }
-    };
     let frames = level.frames as f64;
-    let spatial = |index: usize| (fewer(level.sites[index].spatial, index, 1.0 / frames), size(level, index));
-    let temporal = |index: usize| (fewer(level.sites[index].temporal, index, 1.0), size(level, index));
+    let spatial =
+        |index: usize| (fewer(level.sites[index].spatial, drift, size(level, index), 1.0 / frames), size(level, index));
+    let temporal =
+        |index: usize| (fewer(level.sites[index].temporal, drift, size(level, index), 1.0), size(level, index));
     let mut found = terms(level, part, spatial, factor);
     found.extend(terms(level, part, temporal, -factor / frames));
     found
@@ -122,9 +136,43 @@ pub fn left_in_mean(level: &Level) -> [[f64; 2]; 2] {
 
 /// Variance that a part of the temporal noise has, over several levels that have it alike; of rows without what drifts along them.
 pub fn temporal(levels: &[&Level], part: Part, confidence: f64) -> Interval {
-    let without_drift = |site: &SiteSurvey| MeanSquares { rows: site.row_scatter.mean_square_apart(), ..site.temporal };
+    temporal_of(levels, part, confidence, squares_of(levels, part))
+}
+
+/// The mean squares that tell a part of the temporal noise of levels.
+fn squares_of(levels: &[&Level], part: Part) -> impl Fn(&SiteSurvey) -> MeanSquares + Copy {
     let is_apart = part == Part::Row && are_smooth(&row_scatters(levels));
-    temporal_of(levels, part, confidence, if is_apart { without_drift } else { |site| site.temporal })
+    let drift = if is_apart { None } else { drift_of(levels) };
+    move |site: &SiteSurvey| {
+        if is_apart {
+            return MeanSquares { rows: site.row_scatter.mean_square_apart(), ..site.temporal };
+        }
+        fewer(site.temporal, drift, site.size, 1.0)
+    }
+}
+
+/// The correlation of what a part of the temporal noise of several levels is found to be with what the whole variance of one of them is found
+/// to be: both are made of the same mean squares M, with shares c and g in them.
+///
+/// Σ c g V(M)/√(Σ c² V(M) · V(v))        the first sum over the mean squares of the one level, the second over those of all
+pub fn correlation_with_variance(levels: &[&Level], part: Part, of: &Level) -> f64 {
+    let squares = squares_of(levels, part);
+    let weight = |level: &Level| level.frames as f64 - 1.0;
+    let all: f64 = levels.iter().map(|level| weight(level)).sum();
+    let terms = |level: &Level, part: Part, factor: f64| {
+        all_terms(level, part, |index| (squares(&level.sites[index]), level.sites[index].size), factor)
+    };
+    let (mut own, mut both) = (0.0, 0.0);
+    for level in levels {
+        let of_part = terms(level, part, weight(level) / all);
+        own += of_part.iter().map(|(share, square)| share * share * square.variance()).sum::<f64>();
+        if std::ptr::eq(*level, of) {
+            let with = of_part.iter().zip(terms(level, Part::Total, 1.0));
+            both += with.map(|((c, square), (g, _))| c * g * square.variance()).sum::<f64>();
+        }
+    }
+    let scatter = (own * of.variance_variance).sqrt();
+    if scatter > 0.0 { (both / scatter).clamp(-1.0, 1.0) } else { 0.0 }
 }
 
 /// The drift of the black level along rows over several levels that have it alike, in samples²; none where none is told.
@@ -136,7 +184,12 @@ fn row_scatters(levels: &[&Level]) -> Vec<RowScatter> {
     levels.iter().flat_map(|level| &level.sites).map(|site| site.row_scatter).collect()
 }
 
-fn temporal_of(levels: &[&Level], part: Part, confidence: f64, of: fn(&SiteSurvey) -> MeanSquares) -> Interval {
+fn temporal_of(
+    levels: &[&Level],
+    part: Part,
+    confidence: f64,
+    of: impl Fn(&SiteSurvey) -> MeanSquares + Copy,
+) -> Interval {
     let weight = |level: &Level| level.frames as f64 - 1.0;
     let all: f64 = levels.iter().map(|level| weight(level)).sum();
     let of_level = |level: &&Level| {

@@ -163,10 +163,13 @@ pub const KEYS: [(&str, &str, &str); 31] = [
     ("dcnu", "dark current non-uniformity", ""),
 ];
 
-/// An interval over another of which it is independent.
+/// An interval of what is not below 0 over another of which it is independent.
 pub fn over(of: Interval, by: Interval) -> Interval {
-    let value = of.value / by.value;
-    let [low, high] = [(of.low - of.value, by.high - by.value), (of.high - of.value, by.low - by.value)]
-        .map(|(own, other)| (own / by.value).hypot(value * other / by.value));
-    Interval { value, low: (value - low).max(0.0), high: value + high }
+    over_correlated(of, by, 0.0)
+}
+
+/// The same where the errors of both have such a correlation.
+pub fn over_correlated(of: Interval, by: Interval, correlation: f64) -> Interval {
+    let found = of.over(by, correlation);
+    Interval { low: found.low.max(0.0), ..found }
 }

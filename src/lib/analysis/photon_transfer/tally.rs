@@ -366,7 +366,7 @@ impl Tally {
             mean,
             mean_variance: noise_of_mean / (n * frames),
             variance,
-            variance_variance: self.variance_variance(&drifts, n),
+            variance_variance: self.variance_variance(&drifts, n, self.in_lines(&temporal)),
             at_ends: self.at_ends,
             at_top: if self.at_top.len() <= most_at_top(self.size) { self.at_top } else { Vec::new() },
             mended: self.marks.mended,
@@ -402,9 +402,25 @@ impl Tally {
         (self.apart() / (freedom * freedom) - 2.0 * variance * variance / freedom).max(0.0)
     }
 
-    /// What the temporal variance scatters by. Rows beside rows and columns beside columns are compared, so that light which
-    /// varies smoothly over the frame does not count; what they scatter by beyond photosites counts where it is beyond chance.
-    fn variance_variance(&self, drifts: &[f64], n: f64) -> f64 {
+    /// What the sum of the squares of all photosites scatters by as they have rows, and columns, in common, variances: (L − 1) times the mean
+    /// square of N lines, of N − 1 values in each of L − 1 frames, of which that of places apart comes off.
+    ///
+    /// 2 (L − 1) (N − 1) (M² − M_rest²)
+    fn in_lines(&self, temporal: &MeanSquares) -> [f64; 2] {
+        let [columns, rows] = self.size.map(|extent| extent as f64);
+        let of = |square: &MeanSquare, lines: f64| {
+            let beyond = square.value * square.value - temporal.rest.value * temporal.rest.value;
+            2.0 * (self.frames as f64 - 1.0) * (lines - 1.0) * beyond.max(0.0)
+        };
+        [of(&temporal.rows, rows), of(&temporal.columns, columns)]
+    }
+
+    /// What the temporal variance scatters by: photosites apart, and what they have in common in rows and columns. Rows beside rows and columns beside
+    /// columns are compared besides, so that light which varies smoothly over the frame does not count; what they scatter by beyond that counts where
+    /// it is beyond chance.
+    fn variance_variance(&self, drifts: &[f64], n: f64, in_lines: [f64; 2]) -> f64 {
+        /// Excess kurtosis of the square of a normal number, as of the noise of a line.
+        const OF_SQUARES: f64 = 12.0;
         let drift_squares: f64 = drifts.iter().map(|drift| drift * drift).sum();
         let [columns, rows] = self.size.map(|extent| extent as f64);
         let centered = |square: f64, sums: &mut dyn Iterator<Item = f64>, each: f64| {
@@ -426,13 +442,16 @@ impl Tally {
             })
             .collect();
         let apart = self.apart();
-        let together = |sums: &[f64]| {
+        let together = |sums: &[f64], in_lines: f64| {
             let steps: f64 = sums.windows(2).map(|two| (two[1] - two[0]).powi(2)).sum();
             let scatter = 0.5 * steps / (sums.len() as f64 - 1.0) * sums.len() as f64;
-            beyond_chance(scatter, apart, (3.0 / sums.len() as f64).sqrt())
+            let known = apart + in_lines;
+            let of_lines = if known > 0.0 { in_lines / known } else { 0.0 };
+            let error = ((3.0 + OF_SQUARES * of_lines * of_lines) / sums.len() as f64).sqrt();
+            in_lines + beyond_chance(scatter, known, error)
         };
         let freedom = (self.frames as f64 - 1.0) * n;
-        (apart + together(&of_rows) + together(&of_columns)) / (freedom * freedom)
+        (apart + together(&of_rows, in_lines[0]) + together(&of_columns, in_lines[1])) / (freedom * freedom)
     }
 }
 

@@ -231,15 +231,23 @@ impl Seen {
         let means = tallies(&mut means, &self.regions, &levels, false)?;
         let mut variances = self.plane(|index| self.pixels.variance(index));
         let variances = tallies(&mut variances, &self.regions, &levels, false)?;
-        let predicted = Repeated::of(frame, settings.equations, count).map_err(|why| why.to_string());
-        let predicted = match self.exposures.unlike() {
-            Some(differs) if predicted.is_ok() => Err(differs.to_owned()),
-            _ => predicted,
+        let predicted_of = |frame: &FrameHeader| {
+            let predicted = Repeated::of(frame, settings.equations, count).map_err(|why| why.to_string());
+            match self.exposures.unlike() {
+                Some(differs) if predicted.is_ok() => Err(differs.to_owned()),
+                _ => predicted,
+            }
         };
+        // What several amplifiers have read differs from place to place.
+        let of_frame = frame.taps().is_none().then(|| predicted_of(frame));
+        let mut unpredicted = None;
         let mut samplings = [Samplings::default(), Samplings::default()];
         let mut regions = Vec::new();
         for (index, region) in self.regions.iter().enumerate() {
             let temporal = self.of_frames[index].temporal_tally(&variances[index], &means[index], f64::from(count));
+            let of_place = of_frame.is_none().then(|| predicted_of(&region.header(frame)));
+            let Some(predicted) = of_frame.as_ref().or(of_place.as_ref()) else { continue };
+            unpredicted = unpredicted.or_else(|| why_not(predicted, settings.level.is_some()));
             let known = predicted.as_ref().ok().filter(|_| means[index].channels.not_finite == 0);
             let [of_means, of_variances] = &mut samplings;
             let assess = |tally, prediction: Option<&FramePrediction>, samplings: &mut Samplings| {
@@ -262,10 +270,6 @@ impl Seen {
             let made = Made { means, variances, is_known, frames: count };
             regions.push(made.region(&self.of_frames[index], &of_variances.mean_stds(), tests));
         }
-        let unpredicted = match &predicted {
-            Ok(known) => known.scatter.err().filter(|_| settings.level.is_some()).map(|why| why.to_string()),
-            Err(why) => Some(why.clone()),
-        };
         if settings.level.is_some() {
             check_testable(frame)?;
             if let Some(why) = &unpredicted {
@@ -300,6 +304,14 @@ impl FrameTallies {
     fn variances_of_means(&self) -> Vec<Vec<f64>> {
         let of_group = |group: &Running| (0..group.means().len()).map(|i| group.variance(i)).collect();
         self.means.iter().map(of_group).collect()
+    }
+}
+
+/// Why nothing is predicted, or nothing can be tested where that is asked.
+fn why_not(predicted: &std::result::Result<Repeated, String>, is_asked: bool) -> Option<String> {
+    match predicted {
+        Ok(known) => known.scatter.err().filter(|_| is_asked).map(|why| why.to_string()),
+        Err(why) => Some(why.clone()),
     }
 }
 

@@ -33,6 +33,17 @@ impl Curve {
         self.moved.or_find(|| self.moved())?.interval(of, confidence)
     }
 
+    /// The interval of a number that follows from the values over the gain: what was measured moves both.
+    pub fn over_gain(&self, of: impl Fn(&Values) -> Option<f64>, confidence: f64) -> Option<Interval> {
+        let [own, gain] = [self.interval(&of, confidence)?, self.interval(|values| Some(values.gain), confidence)?];
+        Some(own.over(gain, self.correlation(&of, &|values| Some(values.gain))))
+    }
+
+    /// The correlation of what chance has two numbers off by that follow from the values.
+    pub fn correlation(&self, of: &dyn Fn(&Values) -> Option<f64>, with: &dyn Fn(&Values) -> Option<f64>) -> f64 {
+        self.moved.or_find(|| self.moved()).map_or(0.0, |moved| moved.correlation(of, with))
+    }
+
     /// The values where each number that was measured is moved; none where there are none.
     fn moved(&self) -> Option<Moved> {
         let values = self.values()?;

@@ -42,6 +42,25 @@ pub(super) struct Nudge {
 }
 
 impl Moved {
+    /// The correlation of what two numbers that follow from the values are off by chance; 0 where one of them does not follow, or is off by
+    /// nothing.
+    pub fn correlation(&self, of: &dyn Fn(&Values) -> Option<f64>, with: &dyn Fn(&Values) -> Option<f64>) -> f64 {
+        let [Some(own), Some(other)] = [of(&self.values), with(&self.values)] else { return 0.0 };
+        let slopes = |ends: &[Option<Values>; 2]| {
+            [(of, own), (with, other)].map(|(of, value)| {
+                let [below, above] = ends.each_ref().map(|values| values.as_ref().and_then(of).unwrap_or(value));
+                (above - below) / 2.0
+            })
+        };
+        let by_chance = self.data.iter().filter(|nudge| nudge.datum.variance > 0.0).map(|nudge| &nudge.ends);
+        let sums = by_chance
+            .chain([&self.photons])
+            .map(slopes)
+            .fold([0.0; 3], |[aa, ab, bb], [a, b]| [aa + a * a, ab + a * b, bb + b * b]);
+        let scatter = (sums[0] * sums[2]).sqrt();
+        if scatter > 0.0 { (sums[1] / scatter).clamp(-1.0, 1.0) } else { 0.0 }
+    }
+
     /// The interval of a number that follows from the values, at such confidence; none where it does not follow.
     pub fn interval(&self, of: impl Fn(&Values) -> Option<f64>, confidence: f64) -> Option<Interval> {
         let value = of(&self.values)?;
