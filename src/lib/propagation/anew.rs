@@ -16,7 +16,7 @@ use super::memory::Memory;
 use super::one_photosite::beyond;
 use super::pattern_nodes::{Knee, between, fine_sensitivities, sensitivities};
 use super::reading::{Asked, Reading};
-use super::sharp_counts::{SharpCounts, is_sharp};
+use super::sharp_counts::SharpCounts;
 use crate::metadata::{AdcRecord, PoissonKind};
 use crate::numerics::edges;
 use crate::numerics::gauss::panel;
@@ -251,15 +251,18 @@ impl<'a> Exposed<'a> {
     /// The same where nothing blurs what photosites read of each count: exact along the axis on which charges differ more, at the given
     /// sensitivities of the other; none of too many.
     fn over_steps(&self, counts: &[Vec<Count>; 2], places: [&[(f64, f64)]; 2]) -> Option<Sums> {
+        const MOST_PAIRS: usize = 5000;
         let axis = self.wider();
         let [inner, outer] = match axis {
             Axis::Light => [0, 1],
             Axis::Dark => [1, 0],
         };
         let charge = self.charge(axis);
-        if !is_sharp(&self.adc, self.noise_e) || !charge.is_counted() {
+        let is_few = counts[0].len() * counts[1].len() <= MOST_PAIRS && self.affordable >= AFFORDABLE;
+        if !is_few || !self.law.is_sharp() || !charge.is_counted() {
             return None;
         }
+        let most = self.affordable / places[outer].len() as f64;
         let mut sum = Sums::default();
         for (other, weight) in places[outer] {
             let sharp = SharpCounts {
@@ -271,7 +274,7 @@ impl<'a> Exposed<'a> {
                 full_e: self.law.full_well_e,
                 reading: &self.reading,
             };
-            let [variance, mean, square] = sharp.over_sensitivities(self.affordable)?;
+            let [variance, mean, square] = sharp.over_sensitivities(most)?;
             sum.take(*weight, &Sums { variance, mean, square });
         }
         Some(sum)

@@ -143,15 +143,18 @@ impl Sum {
 
     /// The same where no knot lies between the codes, over each of which `sigma` are a standard deviation.
     fn run(&mut self, adc: &AdcRecord, first: f64, last: f64, sigma: f64) {
-        let is_table = adc.linearization.is_some_and(|curve| !curve.knots().is_empty());
-        let line = is_table.then(|| Line::at(adc, 0.5 * (first + last)));
-        let sample = |code: f64| match &line {
-            Some(line) => line.sample + line.sample_slope * (code - line.code),
-            None => adc.sample(code),
+        // What is smooth goes on beyond the ends of the codes as it is.
+        let curve = adc.linearization.filter(|curve| curve.knots().is_empty());
+        let line = Line::at(adc, 0.5 * (first + last));
+        let above_bias = |code: f64| curve.map(|curve| curve.linear(code - adc.bias_adu));
+        let sample = |code: f64| match above_bias(code) {
+            Some(above) if adc.is_linearized => adc.bias_adu + above,
+            Some(_) => code,
+            None => line.sample + line.sample_slope * (code - line.code),
         };
-        let electrons = |edge: f64| match &line {
-            Some(line) => line.electrons + line.electrons_slope * (edge - line.code),
-            None => adc.electrons_at(edge),
+        let electrons = |edge: f64| match above_bias(edge) {
+            Some(above) => above / adc.adu_per_e,
+            None => line.electrons + line.electrons_slope * (edge - line.code),
         };
         let places = edges::over(first, last, sigma, |edge, weight| {
             self.add(weight, electrons(edge), [edge - 0.5, edge + 0.5].map(sample));

@@ -14,7 +14,6 @@ pub(super) use super::node::Law;
 use super::node::{MANY_WELLS, Node};
 use super::reading::{Asked, ENDLESS, Moments, Reading, codes_of};
 use super::rectified::{corrections, signed_nodes};
-use super::sharp_counts::is_sharp;
 use crate::frame::to_sample;
 use crate::metadata::AdcRecord;
 use crate::numerics::normal::NearlyNormal;
@@ -116,11 +115,13 @@ impl Law {
     /// Whether few counts, each a code or codes on from the last, show how these are rounded at next to all photosites as no less than a
     /// normal law of so many codes would, however many codes they scatter over.
     pub fn counts_show(&self, adc: &AdcRecord, std_codes: f64) -> bool {
-        const FEW: [f64; 2] = [250.0, 5000.0];
+        const FEW: [f64; 2] = [1000.0, 5000.0];
         const MOST_TURNS: u32 = 64;
         let noise_e = self.read_noise_e.max(1e-3);
-        let few = FEW[usize::from(is_sharp(adc, self.read_noise_e))];
-        if self.are_few || self.light.least_counts(noise_e) * self.dark.least_counts(noise_e) > few {
+        let few = FEW[usize::from(self.is_sharp())];
+        // Of kinds of photosites, of which there are many, it would take too long.
+        let is_kind = self.are_few || self.trap_e > 0.0;
+        if is_kind || self.light.least_counts(noise_e) * self.dark.least_counts(noise_e) > few {
             return false;
         }
         // Within three standard deviations of the sensitivity in place of nine.
@@ -132,6 +133,14 @@ impl Law {
             law.damping(angle) + f64::from(turns).ln() < hidden
         };
         (1..=MOST_TURNS).any(shows)
+    }
+
+    /// Whether read noise blurs next to nothing of where along their sensitivities the codes of photosites change.
+    pub fn is_sharp(&self) -> bool {
+        const NEXT_TO_NOTHING: f64 = 0.005;
+        let differs = |charge: &Charge| charge.pattern * charge.rate;
+        self.read_noise_e <= NEXT_TO_NOTHING * differs(&self.light).max(differs(&self.dark))
+            && (self.read_noise_e <= 0.0 || !self.reaches_full_well())
     }
 
     /// The least −ln |E e^(iθy)| of what any photosite reads, y in electrons, where nothing cuts it off.

@@ -7,12 +7,6 @@ use crate::metadata::AdcRecord;
 use crate::numerics::normal::cumulative;
 use crate::numerics::rounding::{REACH, Rounding};
 
-/// Whether read noise blurs next to nothing of how codes are rounded.
-pub(super) fn is_sharp(adc: &AdcRecord, noise_e: f64) -> bool {
-    const SHARP: f64 = 1e-3;
-    noise_e * adc.adu_per_e < SHARP
-}
-
 /// The counts of a photosite, and how they are read.
 pub(super) struct SharpCounts<'a> {
     /// Of the charge whose sensitivities are gone through, and the rms of these.
@@ -70,7 +64,7 @@ impl SharpCounts<'_> {
             }
         }
         // Each is sorted in among the others.
-        effort::spend(4 * steps.len() as u64 + pairs as u64);
+        effort::spend(16 * steps.len() as u64 + pairs as u64);
         steps.sort_by(|a, b| a.z.total_cmp(&b.z));
         Some(summed(moments, &steps, lowest))
     }
