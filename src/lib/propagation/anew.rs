@@ -525,8 +525,10 @@ mod tests {
             let site = Photosite::of_electrons(model, Equations::Exact).digitized(adc);
             let whole = site.moments(light_e).moments.variance;
             let found = site.temporal_variance(light_e, whole);
-            assert!((found / anew - 1.0).abs() < 1e-7, "{light_e}: {found} {anew}");
-            assert!((whole - found - fixed).abs() < 1e-7 * anew, "{light_e}: {} {fixed}", whole - found);
+            // Read noise leaves sensitivities that go by the mean count a few millionths of the pattern.
+            let most_off = if read_noise_e > 0.0 { 5e-6 * fixed } else { 1e-9 };
+            assert!((found - anew).abs() < most_off, "{light_e}: {found} {anew}");
+            assert!((whole - found - fixed).abs() < most_off, "{light_e}: {} {fixed}", whole - found);
         }
     }
 

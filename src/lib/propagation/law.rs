@@ -119,9 +119,7 @@ impl Law {
         const MOST_TURNS: u32 = 64;
         let noise_e = self.read_noise_e.max(1e-3);
         let few = FEW[usize::from(self.is_sharp())];
-        // Of kinds of photosites, of which there are many, it would take too long.
-        let is_kind = self.are_few || self.trap_e > 0.0;
-        if is_kind || self.light.least_counts(noise_e) * self.dark.least_counts(noise_e) > few {
+        if self.is_kind() || self.light.least_counts(noise_e) * self.dark.least_counts(noise_e) > few {
             return false;
         }
         // Within three standard deviations of the sensitivity in place of nine.
@@ -135,11 +133,17 @@ impl Law {
         (1..=MOST_TURNS).any(shows)
     }
 
+    /// Whether it is that of one of the many kinds of photosites that hot ones and jumps make, of each of which little may be worked out.
+    fn is_kind(&self) -> bool {
+        self.are_few || self.trap_e > 0.0
+    }
+
     /// Whether read noise blurs next to nothing of where along their sensitivities the codes of photosites change.
     pub fn is_sharp(&self) -> bool {
         const NEXT_TO_NOTHING: f64 = 0.005;
         let differs = |charge: &Charge| charge.pattern * charge.rate;
-        self.read_noise_e <= NEXT_TO_NOTHING * differs(&self.light).max(differs(&self.dark))
+        !self.is_kind()
+            && self.read_noise_e <= NEXT_TO_NOTHING * differs(&self.light).max(differs(&self.dark))
             && (self.read_noise_e <= 0.0 || !self.reaches_full_well())
     }
 
