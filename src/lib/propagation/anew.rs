@@ -13,7 +13,7 @@ use super::counts::{Charge, Count};
 use super::effort;
 use super::law::Law;
 use super::memory::Memory;
-use super::one_photosite::beyond;
+use super::one_photosite::{PANEL, beyond};
 use super::pattern_nodes::{Knee, between, fine_sensitivities, sensitivities};
 use super::reading::{Asked, Reading};
 use super::sharp_counts::SharpCounts;
@@ -29,9 +29,6 @@ const AFFORDABLE_IF_MANY: f64 = 10_000.0;
 
 /// Evaluations beyond which nothing is said.
 const MOST: u64 = 8_000_000;
-
-/// Width of a panel, in standard deviations of what a photosite reads: 12 nodes leave 10⁻⁹ of a product of normal laws.
-const PANEL: f64 = 4.0;
 
 /// Where what changes with offsets does so over less than this of their standard deviation, nothing is said.
 const LEAST_SMOOTH: f64 = 0.006;

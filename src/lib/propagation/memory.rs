@@ -91,7 +91,7 @@ impl<Key: PartialEq, Answer: Clone> Known<Key, Answer> {
             }
             None => {
                 // Answers are large: they shall not move.
-                self.answers.reserve_exact(if self.next == 0 { KEPT } else { 0 });
+                self.answers.reserve_exact(KEPT - self.next);
                 self.answers.push(answer);
             }
         }

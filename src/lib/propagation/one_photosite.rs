@@ -9,7 +9,7 @@ use crate::numerics::normal::{NearlyNormal, cumulative, density};
 use crate::numerics::rounding::REACH;
 
 /// Width of a panel, in standard deviations: 12 nodes leave 10⁻⁹ of a product of normal laws.
-const PANEL: f64 = 4.0;
+pub(super) const PANEL: f64 = 4.0;
 
 impl Law {
     /// Cumulants of the charge over exposures at a photosite of such sensitivities to light and to dark current, which full well leaves alone.
